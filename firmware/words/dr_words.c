@@ -9,7 +9,7 @@
 
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
-/* -- A text that grows at its end, as far as there is room -------------------------------------------------------------- */
+/* -- A text that grows at its end, as far as there is room --------------------------------------------------------- */
 
 typedef struct {
     char *out;
@@ -32,14 +32,15 @@ static void add(text *t, const char *format, ...)
     const size_t room = t->length < t->room ? t->room - t->length : 0;
     va_list arguments;
     va_start(arguments, format);
+    /* NOLINTNEXTLINE(clang-analyzer-valist.Uninitialized): the analyzer of LLVM 14 overlooks va_start() */
     const int n = vsnprintf(room > 0 ? t->out + t->length : NULL, room, format, arguments);
     va_end(arguments);
     t->length += n > 0 ? (size_t)n : 0;
 }
 
-/* -- Names without regard to case --------------------------------------------------------------------------------------- */
+/* -- Names without regard to case ---------------------------------------------------------------------------------- */
 
-static char lower(char c) { return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c; }
+static int lower(char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; }
 
 static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -52,7 +53,7 @@ static bool same(const char *a, const char *b)
     return lower(*a) == lower(*b);
 }
 
-/* -- Controllers -------------------------------------------------------------------------------------------------------- */
+/* -- Controllers --------------------------------------------------------------------------------------------------- */
 
 const char *dr_words_kind(dr_kind kind) { return kind == DR_TRIO ? "trio" : "mpc"; }
 
@@ -70,39 +71,35 @@ bool dr_words_kind_find(const char *name, dr_kind *out)
     return false;
 }
 
-/* -- Stages ------------------------------------------------------------------------------------------------------------- */
+/* -- Stages -------------------------------------------------------------------------------------------------------- */
 
-typedef struct {
-    dr_kind kind;
-    dr_stage_id id;
-    const char *name; /* '#' stands for one digit or the letter x of a series' name */
-    bool has_s; /* there is a short version, named with an S or [S] behind */
-} stage_name;
-
-/* [T] tables 2, 4, 5; [M] tables 6 to 8. The first name of a stage is the one that we use, and the first row that fits
- * a name decides: MPC-78 is no MPC-x8. */
-static const stage_name stage_names[] = {
-    {DR_TRIO, DR_STAGE_TRIO_MP845, "MP-845", true},  {DR_TRIO, DR_STAGE_TRIO_MP845, "MP-245", true},
-    {DR_TRIO, DR_STAGE_TRIO_MP845, "MP-x45", true},  {DR_TRIO, DR_STAGE_TRIO_MP865, "MP-865", false},
-    {DR_TRIO, DR_STAGE_TRIO_MP285, "MP-285", false}, {DR_TRIO, DR_STAGE_TRIO_MP285, "3DMS", false},
-    {DR_TRIO, DR_STAGE_TRIO_MP285, "MT-78", false},  {DR_TRIO, DR_STAGE_TRIO_MP285, "MOM", false},
-    {DR_TRIO, DR_STAGE_TRIO_MP285, "SOM", false},    {DR_TRIO, DR_STAGE_TRIO_MP265, "MP-265", false},
-    {DR_MPC, DR_STAGE_MPC_MP225, "MP-225", false},   {DR_MPC, DR_STAGE_MPC_MP285, "MP-285", false},
-    {DR_MPC, DR_STAGE_MPC_MP285, "3DMS", false},     {DR_MPC, DR_STAGE_MPC_MP285, "MPC-78", false},
-    {DR_MPC, DR_STAGE_MPC_MP285, "SOM", false},      {DR_MPC, DR_STAGE_MPC_MP265, "MP-265", false},
-    {DR_MPC, DR_STAGE_MPC_MP845, "MP-845", true},    {DR_MPC, DR_STAGE_MPC_MP845, "MP-245", true},
-    {DR_MPC, DR_STAGE_MPC_MP845, "MP-x45", true},    {DR_MPC, DR_STAGE_MPC_MP845, "MPC-#8", false},
-    {DR_MPC, DR_STAGE_MPC_MP865, "MP-865", false},   {DR_MPC, DR_STAGE_MPC_MT800, "MT-800", false},
-    {DR_MPC, DR_STAGE_MPC_MT800, "MT-8#0", false},   {DR_MPC, DR_STAGE_MPC_MT800, "MT-22##", false},
-    {DR_MPC, DR_STAGE_MPC_MOM, "MOM", false},
+/* [T] tables 2, 4, 5; [M] tables 6 to 8. The first name of a stage is the one that we use. '#' stands for a digit or the
+ * x of a series' name; the first row that fits a name decides, so MPC-78 is no MPC-x8. */
+#define NAMES_MAX 6
+static const char *const stage_names[DR_STAGES][NAMES_MAX] = {
+    [DR_STAGE_NONE] = {"none"},
+    [DR_STAGE_TRIO_MP845] = {"MP-845", "MP-245", "MP-x45"},
+    [DR_STAGE_TRIO_MP865] = {"MP-865"},
+    [DR_STAGE_TRIO_MP285] = {"MP-285", "3DMS", "MT-78", "MOM", "SOM"},
+    [DR_STAGE_TRIO_MP265] = {"MP-265"},
+    [DR_STAGE_MPC_MP225] = {"MP-225"},
+    [DR_STAGE_MPC_MP285] = {"MP-285", "3DMS", "MPC-78", "SOM"},
+    [DR_STAGE_MPC_MP265] = {"MP-265"},
+    [DR_STAGE_MPC_MP845] = {"MP-845", "MP-245", "MP-x45", "MPC-#8"},
+    [DR_STAGE_MPC_MP865] = {"MP-865"},
+    [DR_STAGE_MPC_MT800] = {"MT-800", "MT-8#0", "MT-22##"},
+    [DR_STAGE_MPC_MOM] = {"MOM"},
 };
+
+static bool is_stage_of(dr_kind kind, size_t id)
+{
+    dr_stage stage;
+    return dr_stage_get((dr_stage_id)id, &stage) && stage.kind == kind;
+}
 
 const char *dr_words_stage(dr_stage_id id)
 {
-    for (size_t i = 0; i < COUNT(stage_names); i++)
-        if (stage_names[i].id == id)
-            return stage_names[i].name;
-    return "none";
+    return stage_names[(unsigned)id < (unsigned)DR_STAGES ? id : DR_STAGE_NONE][0];
 }
 
 /* Steps over what stands at *name. False: something else stands there. */
@@ -116,16 +113,19 @@ static bool step_over(const char **name, const char *what)
     return true;
 }
 
-static bool is_name_of_stage(const stage_name *row, const char *name)
+static bool names_alike(const char *known, const char *name)
 {
-    for (const char *want = row->name; *want != '\0'; want++)
+    const char *want = known;
+    for (; *want != '\0'; want++) {
         if (*want == '-')
             name += *name == '-' ? 1 : 0;
         else if (lower(*name) == lower(*want) || (*want == '#' && (is_digit(*name) || lower(*name) == 'x')))
             name++;
         else
             return false;
-    if (row->has_s && !step_over(&name, "[S]"))
+    }
+    if (want[-2] == '4' && want[-1] == '5' &&
+        !step_over(&name, "[S]")) /* every MP-x45 has a short version [T table 2] */
         (void)step_over(&name, "S");
     (void)step_over(&name, "/M");
     return *name == '\0';
@@ -133,41 +133,30 @@ static bool is_name_of_stage(const stage_name *row, const char *name)
 
 bool dr_words_stage_find(dr_kind kind, const char *name, dr_stage_id *out)
 {
-    for (size_t i = 0; i < COUNT(stage_names); i++) {
-        if (stage_names[i].kind == kind && is_name_of_stage(&stage_names[i], name)) {
-            *out = stage_names[i].id;
-            return true;
-        }
-    }
+    for (size_t id = 0; id < DR_STAGES; id++)
+        for (size_t i = 0; is_stage_of(kind, id) && i < NAMES_MAX && stage_names[id][i] != NULL; i++)
+            if (names_alike(stage_names[id][i], name)) {
+                *out = (dr_stage_id)id;
+                return true;
+            }
     return false;
-}
-
-static void add_series(text *t, const char *name)
-{
-    for (; *name != '\0'; name++)
-        add(t, "%c", *name == '#' ? 'x' : *name);
 }
 
 size_t dr_words_stages(char *out, size_t room, dr_kind kind)
 {
     text t = text_in(out, room);
-    dr_stage_id last = DR_STAGE_NONE;
-    bool open = false;
-    for (size_t i = 0; i < COUNT(stage_names); i++) {
-        const stage_name *const row = &stage_names[i];
-        if (row->kind != kind)
+    for (size_t id = 0; id < DR_STAGES; id++) {
+        if (!is_stage_of(kind, id))
             continue;
-        if (row->id == last) {
-            add(&t, open ? ", " : " (also ");
-            open = true;
-        } else {
-            add(&t, "%s%s", open ? ")" : "", last == DR_STAGE_NONE ? "" : ", ");
-            open = false;
-            last = row->id;
+        add(&t, "%s%s", t.length > 0 ? ", " : "", stage_names[id][0]);
+        size_t i = 1;
+        for (; i < NAMES_MAX && stage_names[id][i] != NULL; i++) {
+            add(&t, "%s", i == 1 ? " (also " : ", ");
+            for (const char *c = stage_names[id][i]; *c != '\0'; c++)
+                add(&t, "%c", *c == '#' ? 'x' : *c);
         }
-        add_series(&t, row->name);
+        add(&t, "%s", i > 1 ? ")" : "");
     }
-    add(&t, open ? ")" : "");
     return t.length;
 }
 
@@ -199,7 +188,7 @@ size_t dr_words_fit(char *out, size_t room, dr_stage_id id, dr_kind kind, uint16
     return t.length;
 }
 
-/* -- Commands ----------------------------------------------------------------------------------------------------------- */
+/* -- Commands ------------------------------------------------------------------------------------------------------ */
 
 static const dr_command_words command_words[DR_OPS] = {
     [DR_OP_NONE] = {"none", "nothing", "No command.", ""},
@@ -272,7 +261,7 @@ const dr_command_words *dr_words_command(dr_op op)
     return &command_words[(unsigned)op < (unsigned)DR_OPS ? op : DR_OP_NONE];
 }
 
-/* -- Quirks ------------------------------------------------------------------------------------------------------------- */
+/* -- Quirks -------------------------------------------------------------------------------------------------------- */
 
 static const dr_quirk_words quirk_words[DR_QUIRK_IDS] = {
     [DR_QUIRK_ID_SMALL_MOVE_SILENT] = {"small-move-silent",
@@ -280,8 +269,7 @@ static const dr_quirk_words quirk_words[DR_QUIRK_IDS] = {
                                        true, DR_QUIRK_SMALL_MOVE_SILENT},
     [DR_QUIRK_ID_S_NEEDS_PAUSE] =
         {"s-needs-pause",
-         "an S that comes with less than 20 ms of pause in all silences the controller until a "
-         "power cycle",
+         "an S that comes with less than 20 ms of pause in all silences the controller until a power cycle",
          "[R], several", true, true, DR_QUIRK_S_NEEDS_PAUSE},
     [DR_QUIRK_ID_MEASURED_SPEEDS] = {"measured-speeds",
                                      "moves are as fast as one real controller was measured, not as the manual says",
@@ -289,9 +277,7 @@ static const dr_quirk_words quirk_words[DR_QUIRK_IDS] = {
     [DR_QUIRK_ID_BOOT_SECOND] = {"boot-second", "deaf for one second after power-on", "[O] USB commands v1.10", true,
                                  false, DR_QUIRK_BOOT_SECOND},
     [DR_QUIRK_ID_STOP_SAYS_I] =
-        {"stop-says-i",
-         "^C is answered by 'I' and CR; STOP on the ROE sends 'I' alone and the move's CR never "
-         "comes",
+        {"stop-says-i", "^C is answered by 'I' and CR; STOP on the ROE sends 'I' alone and the move's CR never comes",
          "[R], some firmware", false, true, 0},
     [DR_QUIRK_ID_POSITION_13] = {"position-13", "C is answered with 13 bytes, without the drive", "[O] of 2012, [R]",
                                  false, true, 0},
@@ -300,14 +286,11 @@ static const dr_quirk_words quirk_words[DR_QUIRK_IDS] = {
     [DR_QUIRK_ID_NUL_HEARTBEAT] = {"nul-heartbeat", "a 0x00 comes every 100 ms during a long M", "[R], one unit", false,
                                    true, 0},
     [DR_QUIRK_ID_ENDLESS_NEGATIVE] =
-        {"endless-negative",
-         "a target above 0x7FFFFFFF runs the axis to 0 and gives no CR until ^C or a power "
-         "cycle",
+        {"endless-negative", "a target above 0x7FFFFFFF runs the axis to 0 and gives no CR until ^C or a power cycle",
          "[R]", false, false, DR_QUIRK_ENDLESS_NEGATIVE},
-    [DR_QUIRK_ID_PAUSE_ON_STOP] = {"pause-on-stop",
-                                   "^C only pauses: the next move command goes on with the old move and drops its own "
-                                   "target",
-                                   "[R], old firmware", false, false, DR_QUIRK_PAUSE_ON_STOP},
+    [DR_QUIRK_ID_PAUSE_ON_STOP] =
+        {"pause-on-stop", "^C only pauses: the next move command goes on with the old move and drops its own target",
+         "[R], old firmware", false, false, DR_QUIRK_PAUSE_ON_STOP},
     [DR_QUIRK_ID_QUERY_WEDGES] = {"query-wedges",
                                   "a position query during a move silences the controller until a power cycle", "[R]",
                                   false, false, DR_QUIRK_QUERY_WEDGES},
@@ -329,7 +312,7 @@ bool dr_words_quirk_find(const char *name, dr_quirk_id *out)
     return false;
 }
 
-/* -- Numbers ------------------------------------------------------------------------------------------------------------ */
+/* -- Numbers ------------------------------------------------------------------------------------------------------- */
 
 static void add_number(text *t, uint64_t number)
 {
@@ -402,7 +385,7 @@ const char *dr_words_firmware_parse(const char *version_text, uint16_t *out)
     return NULL;
 }
 
-/* -- Points, in microns where the stage is known ------------------------------------------------------------------------- */
+/* -- Points, in microns where the stage is known ------------------------------------------------------------------- */
 
 static const char axis_letters[DR_AXES] = {'X', 'Y', 'Z'};
 
@@ -417,7 +400,8 @@ static void add_axis(text *t, const dr_words_context *context, unsigned axis, ui
         add(t, " um (");
     }
     add_number(t, steps);
-    add(t, unit || !known ? " steps" : "");
+    if (unit || !known)
+        add(t, steps == 1 ? " step" : " steps");
     if (known && steps > stage.travel_steps[axis]) {
         add(t, ", beyond the travel of ");
         add_number(t, stage.travel_steps[axis]);
@@ -444,7 +428,7 @@ size_t dr_words_point(char *out, size_t room, const dr_words_context *context, c
     return t.length;
 }
 
-/* -- Requests ----------------------------------------------------------------------------------------------------------- */
+/* -- Requests ------------------------------------------------------------------------------------------------------ */
 
 /* "0xEE", or "0x31 '1'" where it can be printed. */
 static void add_byte(text *t, uint8_t byte)
@@ -539,7 +523,7 @@ size_t dr_words_request(char *out, size_t room, const dr_words_context *context,
     return t.length;
 }
 
-/* -- Replies ------------------------------------------------------------------------------------------------------------ */
+/* -- Replies ------------------------------------------------------------------------------------------------------- */
 
 static void add_drives(text *t, unsigned count, unsigned connected)
 {
@@ -639,7 +623,7 @@ size_t dr_words_stream(char *out, size_t room, const dr_words_context *context, 
     return t.length;
 }
 
-/* -- Notes -------------------------------------------------------------------------------------------------------------- */
+/* -- Notes --------------------------------------------------------------------------------------------------------- */
 
 const char *dr_words_note_name(dr_note_kind kind)
 {
@@ -700,7 +684,7 @@ const char *dr_words_note_name(dr_note_kind kind)
     return "?";
 }
 
-static char axis_of(uint32_t value) { return value < DR_AXES ? axis_letters[value] : '?'; }
+static int axis_of(uint32_t value) { return value < DR_AXES ? axis_letters[value] : '?'; }
 
 size_t dr_words_note(char *out, size_t room, const dr_words_context *context, const dr_note *note)
 {

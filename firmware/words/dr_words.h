@@ -3,17 +3,19 @@
  * The core holds numbers only; every word that a trace, an error message or a lesson says about the two protocols is
  * here, by the same index. For programs on a computer, not for small boards.
  *
- * Functions that compose text work like snprintf: they write at most `room` bytes, the closing 0 included, and return the
- * length of the whole text (a result >= room: it was cut). `out` may be NULL when room is 0. A text is one line without a
- * line feed. Lengths are given in microns and in microsteps where the stage is known, in microsteps alone where it is not.
+ * Functions that compose text work like snprintf: they write at most `room` bytes, the closing 0 included, and return
+ * the length of the whole text (a result >= room: it was cut). `out` may be NULL when room is 0. A text is one line
+ * without a line feed. Lengths are given in microns and in microsteps where the stage is known, in microsteps alone
+ * where it is not.
  *
- * Sources: [T] and [M] are the manuals (dr_device.h), [O] other manuals of the maker, [R] reports of users, [P] PROTOCOL.md.
+ * Sources: [T] and [M] are the manuals (dr_device.h), [O] other manuals of the maker, [R] reports of users,
+ * [P] PROTOCOL.md.
  * Thread-safety: constant tables and functions of their arguments only. */
 #ifndef DR_WORDS_H
 #define DR_WORDS_H
 
 #include "dr_controller.h" /* dr_note, DR_QUIRK_*: its types only, nothing of it is called */
-#include "dr_device.h" /* dr_kind, dr_op, dr_stage_id */
+#include "dr_device.h"     /* dr_kind, dr_op, dr_stage_id */
 
 #include <stddef.h>
 
@@ -23,7 +25,7 @@ extern "C" {
 
 /* -- Controllers --------------------------------------------------------------------------------------------------- */
 
-const char *dr_words_kind(dr_kind kind); /* as a program's argument: "trio", "mpc" */
+const char *dr_words_kind(dr_kind kind);       /* as a program's argument: "trio", "mpc" */
 const char *dr_words_controller(dr_kind kind); /* as on its label: "TRIO MP-245A", "MPC-200" */
 /* Either of the two, whatever the case of its letters. False: no such controller. */
 bool dr_words_kind_find(const char *name, dr_kind *out);
@@ -43,16 +45,16 @@ size_t dr_words_fit(char *out, size_t room, dr_stage_id id, dr_kind kind, uint16
 /* -- Commands ------------------------------------------------------------------------------------------------------ */
 
 typedef struct {
-    const char *name; /* one word, unique in its controller: "home" */
-    const char *asks; /* what the host asks for: "go home" */
+    const char *name;    /* one word, unique in its controller: "home" */
+    const char *asks;    /* what the host asks for: "go home" */
     const char *meaning; /* a whole sentence */
-    const char *source; /* manual and table */
+    const char *source;  /* manual and table */
 } dr_command_words;
 
 /* Never NULL: what is no command gets the words of DR_OP_NONE. */
 const dr_command_words *dr_words_command(dr_op op);
 
-/* -- Quirks: the one list of all, those of the core and those that a layer around it plays -------------------------- */
+/* -- Quirks: the one list of all, those of the core and those that a layer around it plays ------------------------- */
 
 typedef enum {
     DR_QUIRK_ID_SMALL_MOVE_SILENT,
@@ -70,7 +72,7 @@ typedef enum {
 } dr_quirk_id;
 
 typedef struct {
-    const char *name; /* as a program's argument: "small-move-silent" */
+    const char *name;    /* as a program's argument: "small-move-silent" */
     const char *meaning; /* one line */
     const char *source;
     bool observed; /* one of those that people meet on real controllers: the set `observed` */
