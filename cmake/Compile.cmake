@@ -16,7 +16,7 @@ add_compile_options(
   "$<$<BOOL:${DRYRIG_WERROR}>:-Werror>")
 
 if(DRYRIG_SANITIZE OR DRYRIG_FUZZ)
-  set(flags -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  set(flags -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer "$<$<CONFIG:Debug>:-O1>")
   add_compile_options(${flags})
   add_link_options(${flags})
 endif()

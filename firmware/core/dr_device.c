@@ -75,7 +75,7 @@ static bool known(const dr_command *row, uint16_t firmware) { return row->since 
 
 bool dr_command_find(dr_kind kind, uint16_t firmware, uint8_t code, dr_command *out)
 {
-    for (uint8_t i = 0; dr_command_row(kind, i, out); i++)
+    for (uint8_t i = 0; dr_command_row(kind, i, out); i++) /* at most the rows of the table */
         if (out->code == code && known(out, firmware))
             return true;
     return false;
@@ -83,7 +83,7 @@ bool dr_command_find(dr_kind kind, uint16_t firmware, uint8_t code, dr_command *
 
 bool dr_command_for(dr_kind kind, uint16_t firmware, dr_op op, dr_command *out)
 {
-    for (uint8_t i = 0; dr_command_row(kind, i, out); i++)
+    for (uint8_t i = 0; dr_command_row(kind, i, out); i++) /* at most the rows of the table */
         if (out->op == op && known(out, firmware))
             return true;
     return false;

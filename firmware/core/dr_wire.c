@@ -121,7 +121,7 @@ static bool is_drive(uint8_t value) { return value >= 1u && value <= DR_PORTS; }
 static bool is_bcd(uint16_t value)
 {
     for (uint8_t digit = 0; digit < 4; digit++)
-        if (((value >> (4u * digit)) & 0xFu) > 9u)
+        if ((((unsigned)value >> (4u * digit)) & 0xFu) > 9u)
             return false;
     return true;
 }
