@@ -73,8 +73,8 @@ bool dr_words_kind_find(const char *name, dr_kind *out)
 
 /* -- Stages -------------------------------------------------------------------------------------------------------- */
 
-/* [T] tables 2, 4, 5; [M] tables 6 to 8. The first name of a stage is the one that we use. '#' stands for a digit or the
- * x of a series' name; the first row that fits a name decides, so MPC-78 is no MPC-x8. */
+/* [T] tables 2, 4, 5; [M] tables 6 to 8. The first name of a stage is the one that we use. '#' stands for a digit or
+ * the x of a series' name; the first row that fits a name decides, so MPC-78 is no MPC-x8. */
 #define NAMES_MAX 6
 static const char *const stage_names[DR_STAGES][NAMES_MAX] = {
     [DR_STAGE_NONE] = {"none"},

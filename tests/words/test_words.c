@@ -1,5 +1,5 @@
-/* What dr_words says: every name that the manuals print is known, every index has words, and bytes typed from the manuals'
- * tables come out as the sentences that a person should read. */
+/* What dr_words says: every name that the manuals print is known, every index has words, and bytes typed from the
+ * manuals' tables come out as the sentences that a person should read. */
 #include "dr_words.h"
 
 #include "dr_wire.h"
