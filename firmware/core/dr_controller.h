@@ -61,7 +61,7 @@ typedef struct {
 } dr_drive;
 
 /* A drive as the emulator starts it: connected, calibrated, 1,000 um on each axis (TRIO) or 0,0,0 (MPC), no work position. */
-void dr_drive_init(dr_drive *drive, dr_stage_id stage);
+void dr_drive_init(dr_drive *drive, dr_stage_id id);
 
 /* -- The controller -------------------------------------------------------------------------------------------------- */
 

