@@ -1,0 +1,21 @@
+/* emulator: the emulated controller on a board. A board's main() calls dr_emulator_begin() once and then dr_emulator_step()
+ * for ever; everything else it needs to provide is in port.h. */
+#ifndef DR_EMULATOR_H
+#define DR_EMULATOR_H
+
+#include "dr_controller.h" /* dr_controller, for whoever wants to look at it */
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Switches the controller on, as its power switch does: what it kept is there, and a TRIO calibrates unless told not to. */
+void dr_emulator_begin(void);
+/* What there is to do now, and then dr_port_wait(). */
+void dr_emulator_step(void);
+const dr_controller *dr_emulator_controller(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
