@@ -358,6 +358,18 @@ static void test_notes(void)
     NOTES("0x5B '[' is out of range for angle and changes nothing", trio, .what = DR_NOTE_BAD_VALUE,
           .op = DR_OP_TRIO_ANGLE, .value = 91);
     NOTES("MP-845 was plugged into port 3", mpc, .what = DR_NOTE_CONNECTED, .drive = 2, .value = DR_STAGE_MPC_MP845);
+    NOTES("by hand: go home", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_HOME);
+    NOTES("by hand: go to work", mpc, .what = DR_NOTE_HAND, .value = DR_EFFECT_WORK);
+    NOTES("by hand: calibrate", mpc, .what = DR_NOTE_HAND, .value = DR_EFFECT_CALIBRATE);
+    NOTES("by hand: pause", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_PAUSE);
+    NOTES("by hand: go on", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_RESUME);
+    NOTES("by hand: stop", mpc, .what = DR_NOTE_HAND, .value = DR_EFFECT_STOP);
+    NOTES("by hand: select drive 2", mpc, .what = DR_NOTE_HAND, .value = DR_EFFECT_SELECT, .bytes = {1}, .count = 1);
+    NOTES("by hand: set mode 5", mpc, .what = DR_NOTE_HAND, .value = DR_EFFECT_MODE, .bytes = {5}, .count = 1);
+    NOTES("by hand: set the angle to 30 degrees", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_ANGLE, .bytes = {30},
+          .count = 1);
+    NOTES("by hand: this place is home", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_STORE_HOME);
+    NOTES("by hand: this place is the work position", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_STORE_WORK);
     NOTES("port 3 was unplugged", mpc, .what = DR_NOTE_CONNECTED, .drive = 2, .value = DR_STAGE_NONE);
 }
 
