@@ -250,8 +250,8 @@ static bool plan_leg(dr_controller *c)
     c->leg = straight ? dr_leg_straight(drive->position_steps, goal, q, speed)
                       : dr_leg_each(drive->position_steps, goal, q, speed);
     if (c->move_op == DR_OP_MPC_CALIBRATE && n == 2) { /* beyond 0 and back, where 'C' still shows 0 */
-        const uint32_t beyond[DR_AXES] = {dr_um_to_steps(CALIBRATION_BEYOND_UM, q), 0, 0};
-        const dr_leg out = dr_leg_each(c->move_to_steps, beyond, q, speed);
+        static const uint32_t edge[DR_AXES], beyond_quanta[DR_AXES] = {CALIBRATION_BEYOND_UM * DR_QUANTA_PER_UM};
+        const dr_leg out = dr_leg_each(edge, beyond_quanta, 1, speed);
         c->leg.lasts_us[DR_X] = 2u * out.lasts_us[DR_X];
     }
     return true;
@@ -660,17 +660,15 @@ static void wedge(dr_controller *c, dr_us now, uint8_t op)
 /* ^C at a frame boundary. An MPC-200 stops any move; a TRIO stops 'S' and does not hear it during any other [T 12, M 14]. */
 static void interrupt(dr_controller *c, dr_us now, uint8_t op)
 {
-    if (c->state == DR_STATE_MOVING || c->state == DR_STATE_STRANDED) {
+    if (c->state == DR_STATE_MOVING) {
         if (c->kind == DR_TRIO && c->move_op != DR_OP_TRIO_LINE) {
             note_value(c, now, DR_NOTE_STOP_IGNORED, c->move_op, 0);
             return;
         }
-        if (c->state == DR_STATE_MOVING) {
-            halt(c, now);
-            c->move_is_paused = has_quirk(c, DR_QUIRK_PAUSE_ON_STOP);
-        }
-        c->state = DR_STATE_REST;
+        halt(c, now);
+        c->move_is_paused = has_quirk(c, DR_QUIRK_PAUSE_ON_STOP);
     }
+    c->state = DR_STATE_REST;
     if (connected_drives(c) == 0) {
         note_value(c, now, DR_NOTE_NO_DRIVE, op, 0);
         return;
