@@ -1,0 +1,258 @@
+/* dr_guard: stands between a host and a real controller and lets only safe commands through.
+ *
+ * Three rules without exception:
+ *   a command reaches the controller whole and unchanged, or not at all (bytes are re-timed, never edited);
+ *   the guard itself sends only position queries and ^C, never a motion;
+ *   what the host sends can only make things safer; only a person's inputs can make them less safe.
+ *
+ * Same shape as dr_controller, with two sides. Nothing blocks, calls out, allocates or asks a clock.
+ *
+ *     push_host    the host's bytes have arrived       pull_device   bytes for the controller leave
+ *     push_device  the controller's bytes have arrived pull_host     bytes for the host leave
+ *     due          when something happens by itself    input, link   what people and cables do
+ *
+ * After every call pull both sides and the log, at once: a stop is there to be pulled when the call that caused it
+ * returns. "Pulled" is "on the wire": a frame that nobody has begun to pull is withdrawn by a stop, one that has been
+ * begun is finished and the stop follows it. `now` never goes back.
+ * Refusals are no errors: they are counted, logged and told in dr_guard_status, and the host gets silence (or 'E').
+ * Thread-safety: one thread at a time per guard. */
+#ifndef DR_GUARD_H
+#define DR_GUARD_H
+
+#include "dr_judge.h"  /* dr_limits, dr_verdict, dr_scene */
+
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* -- What the guard tells ------------------------------------------------------------------------------------------- */
+
+typedef enum {
+    DR_GUARD_LOCKED,             /* no valid limits, or the controller has not proved to be the one they are for */
+    DR_GUARD_DISARMED,           /* queries and safe settings pass */
+    DR_GUARD_IDLE,               /* armed: motions are checked and pass */
+    DR_GUARD_CHECKING,           /* a motion waits for the position, or for its turn on the wire */
+    DR_GUARD_MOVING_S,           /* a motion that ^C stops is under way, or its end is being verified */
+    DR_GUARD_MOVING_U,           /* a motion that ^C does not stop */
+    DR_GUARD_STOPPING,           /* ^C was sent; not yet proved at rest */
+    DR_GUARD_FAULT,              /* latched: stop released, cause gone, key off and on; then arm anew */
+    DR_GUARD_STOPPED             /* the same, by the stop input */
+} dr_guard_state;
+
+typedef enum {
+    DR_FAULT_NONE,
+    DR_FAULT_LIMITS,             /* locks: no valid limits */
+    DR_FAULT_IDENTITY,           /* locks: not the controller or firmware that the limits are for */
+    DR_FAULT_NO_DEVICE,          /* locks: the cable or the converter is gone; proof starts when it is back */
+    DR_FAULT_DEVICE_SILENT,      /* it does not answer a position query; at the start: locks */
+    DR_FAULT_NO_CR,              /* a move never told its end; the tip is at rest at a known place */
+    DR_FAULT_EARLY_CR,           /* it told the end while it still moved */
+    DR_FAULT_WRONG_END,          /* it came to rest elsewhere */
+    DR_FAULT_RESUMED_OLD_MOVE,   /* it went on with the move that ^C had broken off */
+    DR_FAULT_IMPLAUSIBLE,        /* two position replies running that cannot be */
+    DR_FAULT_POSITION_JUMP,      /* the tip is where no knob can have put it: power cycle, calibration, lost steps */
+    DR_FAULT_DEVICE_NOISE,       /* more than 16 bytes in a second that nobody asked for */
+    DR_FAULT_UNSTOPPABLE,        /* a stop was asked for and the tip could not be proved at rest in 1 s */
+    DR_FAULT_FRAME_LOST,         /* a calibration was broken off: only a calibration may move anything */
+    DR_FAULT_STOP_WIRING,        /* the two stop contacts disagree for more than 50 ms */
+    DR_FAULT_DAMAGED,            /* limits or state in memory are not what they were: restart the guard */
+    DR_FAULTS
+} dr_fault;
+
+/* What is missing for arming: a set of bits, none when an ARM press will do. */
+enum {
+    DR_NEEDS_LIMITS = 1u << 0,       /* valid limits */
+    DR_NEEDS_IDENTITY = 1u << 1,     /* proof, or CONFIRM where the reply fits both controllers */
+    DR_NEEDS_INSIDE = 1u << 2,       /* the tip within the box and clear, or ESCAPE (as of the last reading) */
+    DR_NEEDS_STOP_RELEASED = 1u << 3,
+    DR_NEEDS_DEVICE = 1u << 4,       /* the device link up */
+    DR_NEEDS_LOG = 1u << 5,          /* a log that works */
+    DR_NEEDS_KEY = 1u << 6,
+    DR_NEEDS_CLEAR = 1u << 7,        /* a fault or stop is latched: key off and on */
+    DR_NEEDS_TIP = 1u << 8,          /* the tip was changed: CONFIRM */
+    DR_NEEDS_REST = 1u << 9,         /* something is under way */
+    DR_NEEDS_STEADY = 1u << 10       /* the last ARM found two readings that differ */
+};
+
+typedef struct {
+    uint8_t state;                          /* dr_guard_state */
+    uint8_t fault;                          /* dr_fault that is latched or locks */
+    uint16_t needs;                         /* DR_NEEDS_* */
+    bool confirm_wanted;                    /* identity is ambiguous, tip changed, or there are no obstacles: CONFIRM */
+    bool in_tissue, escape, may_calibrate;
+    bool buzzer;                            /* a stop was asked for and something may still move */
+    bool cut;                               /* open the relay in the controller's supply (DR_RIG_HAS_CUT) */
+    bool position_known;                    /* position_steps: at rest, at the last reading */
+    uint8_t drive, angle_deg;               /*     of this drive (index), at this angle (TRIO) */
+    uint32_t position_steps[DR_AXES];
+    uint8_t last_op;                        /* dr_op that was refused last, and why */
+    dr_verdict last_refusal;
+    uint32_t forwarded, refused, dropped_bytes, quarantined_bytes; /* since start; they wrap */
+    uint32_t log_missed;                    /* records that were overwritten unread */
+} dr_guard_status;
+
+/* -- Log ------------------------------------------------------------------------------------------------------------ */
+
+typedef enum {
+    DR_EVENT_START,              /* position[0] = dr_limits_crc, position[1] = revision; code = 1 after a watchdog reset */
+    DR_EVENT_STATE,              /* the state changed; code = dr_fault */
+    DR_EVENT_ALLOWED,            /* host frame -> controller: bytes */
+    DR_EVENT_REFUSED,            /* host frame refused: bytes, code = dr_reason, axis, item; position = where the tip was */
+    DR_EVENT_DROPPED,            /* host bytes that were no frame: the first bytes; code = dr_reason; count = how many */
+    DR_EVENT_REPLY,              /* controller -> host, as much as fits: bytes, code = dr_op */
+    DR_EVENT_READING,            /* the guard's own query was answered: position, item = drive or angle */
+    DR_EVENT_IMPLAUSIBLE,        /* it was answered by nonsense: bytes */
+    DR_EVENT_QUARANTINED,        /* controller bytes that nobody asked for: bytes; count = how many */
+    DR_EVENT_STOP,               /* ^C -> controller; code = dr_stop_cause */
+    DR_EVENT_ENDED,              /* a motion ended where it should: position */
+    DR_EVENT_NO_REPLY,           /* a host's query or setting stayed unanswered; code = dr_op */
+    DR_EVENT_INPUT,              /* code = dr_input, item = on */
+    DR_EVENT_LINK                /* code: bit 0 host open, bit 1 device present */
+} dr_event;
+
+typedef enum {
+    DR_STOP_HOST, DR_STOP_INPUT, DR_STOP_HOST_LOST, DR_STOP_KEY, DR_STOP_DEADLINE, DR_STOP_EARLY_CR, DR_STOP_AGAIN,
+    DR_STOP_AFTER_RESET, DR_STOP_NOISE
+} dr_stop_cause;
+
+#define DR_RECORD_TEXT 16u
+typedef struct {
+    uint32_t sequence;                      /* from 0 at start */
+    dr_us when;
+    uint8_t event;                          /* dr_event */
+    uint8_t before, after;                  /* dr_guard_state */
+    uint8_t code, axis, item;
+    uint8_t op;                             /* dr_op that it is about */
+    uint8_t count;                          /* of bytes; stops at 255; DR_RECORD_TEXT of them are kept */
+    uint8_t bytes[DR_RECORD_TEXT];
+    uint32_t position_steps[DR_AXES];
+    uint32_t crc;                           /* CRC-32C of the record before, chained over all of this but crc */
+} dr_record;
+#define DR_RECORD_BYTES 48u
+
+/* The record as stored or sent: DR_RECORD_BYTES, fields in the order above, little-endian. */
+void dr_record_put(const dr_record *record, uint8_t *bytes);
+/* The crc that the record must have after one with crc `before` (0 before the first). */
+uint32_t dr_record_crc(uint32_t before, const dr_record *record);
+
+/* -- The guard ------------------------------------------------------------------------------------------------------ */
+
+typedef enum {
+    DR_INPUT_STOP,               /* level: stop contact open, or button down; the first of two channels */
+    DR_INPUT_STOP_2,             /* level: the second channel; who has one sets both */
+    DR_INPUT_KEY,                /* level: off disarms; off and on clears a fault or stop whose cause is gone */
+    DR_INPUT_ARM,                /* press: off -> on is the edge */
+    DR_INPUT_MAY_CALIBRATE,      /* level: held while a calibration may start */
+    DR_INPUT_IN_TISSUE,          /* level: only moves along the approach line; the caller keeps it over power-off */
+    DR_INPUT_ESCAPE,             /* level: arming with the tip in a forbidden place, to move it out */
+    DR_INPUT_TIP_CHANGED,        /* press: disarms until CONFIRM */
+    DR_INPUT_CONFIRM,            /* press: identity, changed tip, no obstacles: a person has looked */
+    DR_INPUT_LOG_FAILED,         /* level: the log cannot be kept; disarms */
+    DR_INPUTS
+} dr_input;
+
+/* Instants at which the guard acts by itself. */
+enum {
+    DR_TIMER_FRAME, DR_TIMER_RESYNC, DR_TIMER_TASK, DR_TIMER_READ, DR_TIMER_STOP, DR_TIMER_REPEAT, DR_TIMER_SEND,
+    DR_TIMER_IDLE, DR_TIMER_RATE, DR_TIMER_NOISE, DR_TIMER_STALE, DR_TIMER_WIRING, DR_TIMER_RELEASE, DR_TIMERS
+};
+
+#define DR_HOST_OUT_MAX 64u
+
+typedef struct {
+    /* everything here belongs to dr_guard; ask dr_guard_get_status() */
+    const dr_limits *limits;
+    uint32_t limits_crc;
+    dr_record *ring;
+    uint16_t ring_size, ring_first, ring_count;
+    uint32_t ring_missed, sequence, crc;
+
+    uint8_t mode, mode_inverse;             /* kept twice: a flipped bit must not arm */
+    uint8_t fault, shown_state;
+    uint16_t inputs;                        /* bit per dr_input */
+    bool host_open, device_present, wiring_alarm, proved, profile_known, confirmed, tip_changed, unsteady, ambiguous;
+    bool cut, buzzer, stop_latched;
+
+    dr_us at[DR_TIMERS];
+    uint16_t running;                       /* bit per timer */
+    dr_us frame_began;
+
+    dr_framer framer;                       /* the host's frame that is arriving */
+    bool resync, tainted, frame_has_stop;
+    uint8_t dropped[DR_RECORD_TEXT];        /* host bytes that were no frame, for one record */
+    uint16_t dropped_count;
+    uint8_t dropped_reason;
+
+    uint8_t task, task_phase;               /* what is under way on the device's side */
+    dr_command command;                     /* the command that is pending, under way or passed on */
+    dr_request request;
+    uint8_t frame[DR_FRAME_MAX];
+    uint8_t reply_have, reply_want, stream_left, passes; /* of the reply that is awaited */
+    uint8_t reply[DR_REPLY_MAX];
+
+    uint8_t read_phase, read_have;          /* the guard's own position query */
+    bool read_again;
+    uint8_t read[DR_REPLY_MAX];
+    uint32_t first_steps[DR_AXES];          /* of two readings that must agree */
+    bool has_first;
+
+    uint8_t out[DR_FRAME_MAX];              /* to the device: one frame or query */
+    uint8_t out_at, out_count, out_ready;   /* out_ready: how many may leave now (the pause within 'S') */
+    uint8_t stops_out;                      /* ^C that wait to leave */
+    uint8_t to_host[DR_HOST_OUT_MAX];
+    uint8_t to_host_first, to_host_count;
+
+    uint8_t stop_owed, stop_crs, stop_sent, stop_skip; /* CRs owed to the host, seen; ^C sent; reply bytes to come first */
+    uint8_t stop_fault;                     /* dr_fault when rest is proved */
+    bool stop_unsure, moved;
+
+    dr_path path;                           /* of the move under way */
+    uint32_t move_from[DR_AXES];
+    bool move_small;
+    uint8_t tokens;                         /* motions that may start now */
+    uint8_t noise;
+
+    dr_scene scene;                         /* what is known: position, drive, angle, interrupted move */
+    bool position_known, position_stale;
+    dr_us position_at;
+
+    uint8_t last_op;
+    dr_verdict last_refusal;
+    uint32_t forwarded, refused, dropped_bytes, quarantined_bytes;
+} dr_guard;
+
+/* A guard of these limits, which stay the caller's and must not change; NULL or limits that dr_limits_check() refuses:
+ * LOCKED for good. ring: memory of the log, at least one record; NULL or size 0: never arms. */
+void dr_guard_init(dr_guard *g, const dr_limits *limits, dr_record *ring, uint16_t size);
+/* Power is on. after_reset: a watchdog or brown-out ended the time before: the first byte is then a ^C. Call
+ * dr_guard_link() next; the proof of identity begins 1 s after the device is present. */
+void dr_guard_start(dr_guard *g, dr_us now, bool after_reset);
+
+void dr_guard_push_host(dr_guard *g, dr_us now, const uint8_t *bytes, size_t count);
+void dr_guard_push_device(dr_guard *g, dr_us now, const uint8_t *bytes, size_t count);
+/* Bytes that leave now; how many, 0 when there are none yet. */
+size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room);
+size_t dr_guard_pull_host(dr_guard *g, dr_us now, uint8_t *bytes, size_t room);
+/* When something will happen by itself (a byte that must wait before it can be pulled counts). False: never, as things
+ * are. At that instant call any function with that `now`, dr_guard_pull_device() for one. */
+bool dr_guard_due(const dr_guard *g, dr_us *when);
+
+/* What a person does. Never call it for anything that came over the host's wire. */
+void dr_guard_input(dr_guard *g, dr_us now, dr_input what, bool on);
+/* Cables: may be called with nothing changed. device_present false -> true: the identity is proved anew. The caller looks
+ * at the converter's serial number itself: another one than the limits' is a device that is not present. */
+void dr_guard_link(dr_guard *g, dr_us now, bool host_open, bool device_present);
+/* A byte was lost on the line from the host (overrun, framing or parity error): the frame is dropped. */
+void dr_guard_host_line_error(dr_guard *g, dr_us now);
+/* Do the limits and the state in memory hold what they should? Once a second, say; before every motion it is done anyway. */
+bool dr_guard_self_check(dr_guard *g, dr_us now);
+
+void dr_guard_get_status(const dr_guard *g, dr_guard_status *out);
+/* The oldest record, in order. False: there is none. */
+bool dr_guard_pull_log(dr_guard *g, dr_record *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
