@@ -98,7 +98,7 @@ size_t dr_wire_put_reply(const dr_command *command, const dr_reply *reply, uint8
     case DR_OP_MPC_DRIVES:
         bytes[0] = reply->value;
         for (uint8_t port = 0; port < DR_PORTS; port++)
-            bytes[1u + port] = (reply->connected >> port) & 1u;
+            bytes[1u + port] = (uint8_t)((reply->connected >> port) & 1);
         break;
     case DR_OP_MPC_ACTIVE: /* minor version first [M note 15]; below 3.00 the drive alone */
         bytes[0] = reply->value;

@@ -45,7 +45,7 @@ static size_t carried(dr_us now)
     if (now - line_at > LAG_US)
         line_at = now - LAG_US;
     const uint32_t elapsed_ns = (now - line_at) * 1000u;
-    return elapsed_ns < line_at_ns ? 0 : (elapsed_ns - line_at_ns) / byte_ns;
+    return elapsed_ns < line_at_ns ? 0 : (size_t)((elapsed_ns - line_at_ns) / byte_ns);
 }
 
 static dr_us after_bytes(size_t count) { return line_at + (line_at_ns + (uint32_t)count * byte_ns) / 1000u; }
@@ -120,7 +120,7 @@ void dr_emulator_begin(void)
 {
     const uint8_t straps = dr_port_begin();
     const bool is_trio = (EMULATOR_KIND == DR_TRIO) != ((straps & DR_STRAP_OTHER) != 0);
-    const uint8_t set = (straps & DR_STRAP_STAGES) >> DR_STRAP_STAGES_SHIFT;
+    const uint8_t set = (uint8_t)((straps & DR_STRAP_STAGES) >> DR_STRAP_STAGES_SHIFT);
     const uint8_t *stages = is_trio ? trio_stages[set] : mpc_stages[set];
     const uint32_t baud = is_trio ? DR_BAUD_TRIO : DR_BAUD_MPC;
     const dr_hand power_on = {.what = DR_HAND_POWER_ON};
@@ -130,7 +130,7 @@ void dr_emulator_begin(void)
     dr_controller_init(&controller, is_trio ? DR_TRIO : DR_MPC, drives, is_trio ? 1 : DR_PORTS);
     controller.calibrates_at_power_on = (straps & DR_STRAP_KEEP) == 0;
     (void)dr_keep_load(&keep, &controller);
-    byte_ns = (DR_BITS_PER_BYTE * UINT32_C(1000000000) + baud / 2u) / baud;
+    byte_ns = UINT32_C(1000000000) / (baud / DR_BITS_PER_BYTE);
     dr_port_open(baud);
     heard = dr_port_now_us();
     (void)dr_controller_poke(&controller, heard, &power_on);

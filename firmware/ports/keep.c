@@ -70,7 +70,7 @@ static size_t encode(const dr_controller *c, uint16_t serial, uint8_t *record)
     for (uint8_t i = 0; i < c->drive_count; i++) {
         const dr_drive *drive = &c->drives[i];
         *at++ = drive->stage;
-        *at++ = (uint8_t)(drive->calibration << CALIBRATION_SHIFT | (drive->work_is_set ? WORK_IS_SET : 0u));
+        *at++ = (uint8_t)((uint8_t)(drive->calibration << CALIBRATION_SHIFT) | (drive->work_is_set ? WORK_IS_SET : 0u));
         at = put_point(at, drive->position_steps);
         at = put_point(at, drive->work_steps);
     }
@@ -97,7 +97,7 @@ static void decode(dr_controller *c, const uint8_t *record)
     const uint8_t *at = record + HEAD_BYTES;
     for (uint8_t i = 0; i < c->drive_count; i++, at += DRIVE_BYTES) {
         dr_drive *drive = &c->drives[i];
-        drive->work_is_set = (at[1] & WORK_IS_SET) != 0;
+        drive->work_is_set = (at[1] & WORK_IS_SET) != 0u;
         drive->calibration = at[1] >> CALIBRATION_SHIFT;
         get_point(at + 2, drive->position_steps);
         get_point(at + 2 + POINT_BYTES, drive->work_steps);

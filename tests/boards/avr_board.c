@@ -196,8 +196,14 @@ static int transfer(uint32_t what, uint8_t endpoint, uint8_t *bytes, uint32_t *c
 /* A control transfer. Returns how many bytes there were, or ends the program: this board's USB does not work. */
 static uint32_t control(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint8_t *data, uint16_t length)
 {
-    uint8_t setup[8] = {type, request, (uint8_t)value, (uint8_t)(value >> 8), (uint8_t)index, (uint8_t)(index >> 8),
-                        (uint8_t)length, (uint8_t)(length >> 8)};
+    uint8_t setup[8] = {type,
+                        request,
+                        (uint8_t)value,
+                        (uint8_t)(value >> 8),
+                        (uint8_t)index,
+                        (uint8_t)(index >> 8),
+                        (uint8_t)length,
+                        (uint8_t)(length >> 8)};
     uint32_t count = sizeof setup, got = 0, none = 0;
     const bool is_in = (type & 0x80) != 0;
     errno = 0;
@@ -234,14 +240,14 @@ static void usb_begin(void)
         fail("USB: the board did not attach");
     (void)avr_ioctl(avr, AVR_IOCTL_USB_RESET, NULL);
     run(FRAME_CYCLES * 10u);
-    (void)control(0x80, 6, 0x0100, 0, bytes, 18);          /* device descriptor */
-    (void)control(0x00, 5, 5, 0, NULL, 0);                 /* SET_ADDRESS */
-    (void)control(0x80, 6, 0x0302, 0x0409, bytes, 255);    /* product string, UTF-16 */
+    (void)control(0x80, 6, 0x0100, 0, bytes, 18);       /* device descriptor */
+    (void)control(0x00, 5, 5, 0, NULL, 0);              /* SET_ADDRESS */
+    (void)control(0x80, 6, 0x0302, 0x0409, bytes, 255); /* product string, UTF-16 */
     (void)fputs("avr_board: USB product: ", stderr);
     for (int i = 2; i < bytes[0]; i += 2)
         (void)fputc(bytes[i], stderr);
     (void)fputc('\n', stderr);
-    (void)control(0x80, 6, 0x0200, 0, bytes, 9);           /* configuration: its length first */
+    (void)control(0x80, 6, 0x0200, 0, bytes, 9); /* configuration: its length first */
     const uint16_t length = (uint16_t)(bytes[2] | bytes[3] << 8);
     const uint32_t got = control(0x80, 6, 0x0200, 0, bytes, length < sizeof bytes ? length : (uint16_t)sizeof bytes);
     for (uint32_t i = 0; i + 3 < got && bytes[i] > 0; i += bytes[i])
@@ -253,7 +259,7 @@ static void usb_begin(void)
         }
     if (endpoint_in == 0 || endpoint_out == 0)
         fail("USB: no serial port in the configuration");
-    (void)control(0x00, 9, 1, 0, NULL, 0);                 /* SET_CONFIGURATION */
+    (void)control(0x00, 9, 1, 0, NULL, 0);                  /* SET_CONFIGURATION */
     (void)control(0x21, 0x20, 0, 0, coding, sizeof coding); /* SET_LINE_CODING */
 }
 
@@ -413,26 +419,42 @@ static void load(const char *mcu, const char *path)
 
 int main(int argc, char **argv)
 {
-    static const struct option options[] = {
-        {"usb", no_argument, NULL, 'u'},          {"flat-out", no_argument, NULL, 'f'},
-        {"memory", required_argument, NULL, 'm'}, {"link", required_argument, NULL, 'l'},
-        {"script", required_argument, NULL, 's'}, {"program", no_argument, NULL, 'p'},
-        {NULL, 0, NULL, 0}};
+    static const struct option options[] = {{"usb", no_argument, NULL, 'u'},
+                                            {"flat-out", no_argument, NULL, 'f'},
+                                            {"memory", required_argument, NULL, 'm'},
+                                            {"link", required_argument, NULL, 'l'},
+                                            {"script", required_argument, NULL, 's'},
+                                            {"program", no_argument, NULL, 'p'},
+                                            {NULL, 0, NULL, 0}};
     const char *memory_path = NULL, *link_path = NULL, *script_path = NULL;
     bool flat_out = false, is_program = false;
     for (int option; (option = getopt_long(argc, argv, "", options, NULL)) != -1;)
         switch (option) {
-        case 'u': is_usb = true; break;
-        case 'f': flat_out = true; break;
-        case 'm': memory_path = optarg; break;
-        case 'l': link_path = optarg; break;
-        case 's': script_path = optarg; break;
-        case 'p': is_program = true; break;
-        default: return 2;
+        case 'u':
+            is_usb = true;
+            break;
+        case 'f':
+            flat_out = true;
+            break;
+        case 'm':
+            memory_path = optarg;
+            break;
+        case 'l':
+            link_path = optarg;
+            break;
+        case 's':
+            script_path = optarg;
+            break;
+        case 'p':
+            is_program = true;
+            break;
+        default:
+            return 2;
         }
     errno = 0;
     if (argc - optind != 2)
-        fail("usage: avr_board [--usb] [--flat-out] [--memory FILE] [--link PATH] [--script FILE | --program] MCU IMAGE.elf");
+        fail("usage: avr_board [--usb] [--flat-out] [--memory FILE] [--link PATH] [--script FILE | --program] MCU "
+             "IMAGE.elf");
     load(argv[optind], argv[optind + 1]);
     if (memory_path != NULL)
         memory(memory_path, false);

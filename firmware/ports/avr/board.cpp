@@ -1,0 +1,92 @@
+/* Boards of Arduino's AVR core: Uno and Mega (the line is their first UART), Leonardo and Micro (native USB). */
+#include "emulator.h"
+#include "port.h"
+
+#include <Arduino.h>
+#include <avr/eeprom.h>
+
+static const uint8_t strap_pins[] = {2, 3, 4, 5}; /* DR_STRAP_* from the lowest bit on: closed is connected to ground */
+
+uint8_t dr_port_begin(void)
+{
+    uint8_t straps = 0;
+    for (uint8_t i = 0; i < sizeof strap_pins; i++)
+        pinMode(strap_pins[i], INPUT_PULLUP);
+    delayMicroseconds(100); /* the pull-ups against the pins' capacitance */
+    for (uint8_t i = 0; i < sizeof strap_pins; i++)
+        if (digitalRead(strap_pins[i]) == LOW)
+            straps = (uint8_t)(straps | 1u << i);
+    return straps;
+}
+
+void dr_port_open(uint32_t baud) { Serial.begin(baud); }
+
+dr_us dr_port_now_us(void) { return micros(); }
+
+void dr_port_wait(bool, dr_us) {} /* no board of these runs from a battery */
+
+size_t dr_port_read(uint8_t *bytes, size_t room)
+{
+    size_t count = 0;
+    while (count < room && Serial.available() > 0)
+        bytes[count++] = (uint8_t)Serial.read();
+    return count;
+}
+
+#ifdef USBCON
+
+/* Until the host opens the port (DTR), what is sent is lost, as on a line that nobody has plugged in. */
+size_t dr_port_room(void) { return Serial.dtr() ? (size_t)Serial.availableForWrite() : DR_REPLY_MAX; }
+
+void dr_port_write(const uint8_t *bytes, size_t count)
+{
+    if (count > 0 && Serial.dtr()) {
+        (void)Serial.write(bytes, count);
+        Serial.flush();
+    }
+}
+
+bool dr_port_has_pace(void) { return false; }
+
+#else
+
+#define AHEAD 8 /* and two more in the UART: what is computed meanwhile takes less than these take to leave */
+
+size_t dr_port_room(void)
+{
+    const int waiting = SERIAL_TX_BUFFER_SIZE - 1 - Serial.availableForWrite();
+    return waiting < AHEAD ? (size_t)(AHEAD - waiting) : 0;
+}
+
+void dr_port_write(const uint8_t *bytes, size_t count) { (void)Serial.write(bytes, count); }
+
+bool dr_port_has_pace(void) { return true; }
+
+#endif
+
+uint16_t dr_port_slots(void) { return (E2END + 1u) / DR_PORT_SLOT_BYTES; }
+
+static uint16_t address(uint16_t slot) { return (uint16_t)(slot * DR_PORT_SLOT_BYTES); }
+
+void dr_port_slot_read(uint16_t slot, uint8_t *bytes, size_t count)
+{
+    eeprom_read_block(bytes, reinterpret_cast<const void *>(address(slot)), count);
+}
+
+/* A byte takes 3.4 ms, which is longer than the line may be left alone: one a call, and only when the last one is done. */
+bool dr_port_slot_write(uint16_t slot, const uint8_t *bytes, size_t count)
+{
+    static uint8_t at;
+    if (!eeprom_is_ready())
+        return false;
+    if (at == count) {
+        at = 0;
+        return true;
+    }
+    eeprom_update_byte(reinterpret_cast<uint8_t *>(address(slot) + at), bytes[at]);
+    at++;
+    return false;
+}
+
+void setup() { dr_emulator_begin(); }
+void loop() { dr_emulator_step(); }
