@@ -5,7 +5,7 @@ if(DRYRIG_SANITIZE OR DRYRIG_FUZZ OR DRYRIG_COVERAGE)
 endif()
 string(REGEX REPLACE "nm([^/]*)$" "size\\1" DRYRIG_SIZE "${CMAKE_NM}")
 
-set(modules dr_device dr_wire dr_motion dr_controller)
+get_property(modules DIRECTORY "${PROJECT_SOURCE_DIR}/firmware/core" PROPERTY BUILDSYSTEM_TARGETS)
 set(structs dr_controller dr_drive dr_note)
 set(source "#include \"dr_controller.h\"\n")
 foreach(struct IN LISTS structs)
