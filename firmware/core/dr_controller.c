@@ -6,6 +6,7 @@
 #define CALIBRATION_BEYOND_UM 250u             /* how far an MPC's calibration goes beyond 0 (chosen [P]) */
 #define LAST_POSITIVE UINT32_C(0x7FFFFFFF)     /* quirk endless-negative: what lies above is "negative" */
 #define MODE_LAST 9u                           /* [M table 9, 'L'] */
+#define STOPPED_BY_HAND 0x80u                  /* in out_op, beside the dr_op of the move whose CR it is */
 
 /* The most that can happen within one call without a byte leaving: every kept command may end without an answer, in up to
  * LEGS legs, each after a streamed frame. */
@@ -17,6 +18,13 @@
 static dr_kind kind_of(const dr_controller *c) { return (dr_kind)c->kind; }
 static dr_drive *active_drive(const dr_controller *c) { return &c->drives[c->active]; }
 static bool has_quirk(const dr_controller *c, uint16_t quirk) { return (c->quirks & quirk) != 0; }
+static bool is_moving(const dr_controller *c) { return c->state == DR_STATE_MOVING || c->state == DR_STATE_PAUSED; }
+
+/* How much of the leg is done, while it moves. */
+static dr_us leg_elapsed_us(const dr_controller *c, dr_us now)
+{
+    return c->state == DR_STATE_PAUSED ? c->leg_began : now - c->leg_began;
+}
 
 static void count_up(uint16_t *counter)
 {
@@ -146,10 +154,15 @@ dr_op dr_controller_answering(const dr_controller *c, bool *first)
 {
     *first = c->out_at == 0 || c->out_at >= c->out_bytes;
     if (c->out_at < c->out_bytes)
-        return (dr_op)c->out_op;
+        return (dr_op)(c->out_op & ~STOPPED_BY_HAND);
     if (c->interrupt_crs > 0)
         return c->kind == DR_TRIO ? DR_OP_TRIO_INTERRUPT : DR_OP_MPC_INTERRUPT;
     return DR_OP_NONE;
+}
+
+bool dr_controller_answers_stop(const dr_controller *c)
+{
+    return (c->out_op & STOPPED_BY_HAND) != 0 && c->out_at + 1u == c->out_bytes;
 }
 
 /* -- Moves: which legs they are made of ------------------------------------------------------------------------------ */
@@ -300,7 +313,7 @@ static void end_leg(dr_controller *c, dr_us when)
 static void halt(dr_controller *c, dr_us now)
 {
     dr_drive *drive = active_drive(c);
-    dr_leg_at(&c->leg, now - c->leg_began, drive->position_steps);
+    dr_leg_at(&c->leg, leg_elapsed_us(c, now), drive->position_steps);
     c->state = DR_STATE_REST;
     if (c->move_op == DR_OP_MPC_CALIBRATE || c->move_op == DR_OP_TRIO_RECALIBRATE)
         drive->calibration = DR_UNCALIBRATED;
@@ -389,7 +402,7 @@ static void begin_targeted(dr_controller *c, dr_us when, const dr_request *reque
     c->move_is_endless = endless;
 }
 
-static void begin_home(dr_controller *c, dr_us when, uint8_t op)
+static void begin_home(dr_controller *c, dr_us when, uint8_t op, bool answers)
 {
     const dr_drive *drive = active_drive(c);
     const bool calibrates = op == DR_OP_TRIO_RECALIBRATE || op == DR_OP_MPC_CALIBRATE;
@@ -401,16 +414,17 @@ static void begin_home(dr_controller *c, dr_us when, uint8_t op)
     }
     if (!calibrates && !drive->y_moves_home)
         target[DR_Y] = drive->position_steps[DR_Y];
-    begin_move(c, when, op, DR_SPEED_FULL, target, true);
+    begin_move(c, when, op, DR_SPEED_FULL, target, answers);
 }
 
-static void begin_work(dr_controller *c, dr_us when, uint8_t op)
+static void begin_work(dr_controller *c, dr_us when, uint8_t op, bool answers)
 {
     const dr_drive *drive = active_drive(c);
     uint32_t target[DR_AXES];
     if (!drive->work_is_set || (op == DR_OP_MPC_WORK && !drive->at_home)) {
         note_value(c, when, drive->work_is_set ? DR_NOTE_NOT_AT_HOME : DR_NOTE_NO_WORK, op, 0);
-        answer_cr(c, when, op);
+        if (answers)
+            answer_cr(c, when, op);
         return;
     }
     copy_point(target, drive->work_steps);
@@ -418,16 +432,16 @@ static void begin_work(dr_controller *c, dr_us when, uint8_t op)
     hold_axis(c, when, op, target);
     if (op == DR_OP_MPC_WORK && !drive->y_moves_home)
         target[DR_Y] = drive->position_steps[DR_Y];
-    begin_move(c, when, op, DR_SPEED_FULL, target, true);
+    begin_move(c, when, op, DR_SPEED_FULL, target, answers);
 }
 
-static void begin_centre(dr_controller *c, dr_us when, uint8_t op)
+static void begin_centre(dr_controller *c, dr_us when, uint8_t op, bool answers)
 {
     const dr_stage stage = active_stage(c);
     uint32_t target[DR_AXES];
     for (uint8_t axis = 0; axis < DR_AXES; axis++)
         target[axis] = stage.travel_steps[axis] / 2u;
-    begin_move(c, when, op, DR_SPEED_FULL, target, true);
+    begin_move(c, when, op, DR_SPEED_FULL, target, answers);
 }
 
 static void resume_move(dr_controller *c, dr_us when)
@@ -449,14 +463,14 @@ static void begin_motion(dr_controller *c, dr_us when, const dr_command *command
     case DR_OP_TRIO_RECALIBRATE:
     case DR_OP_MPC_HOME:
     case DR_OP_MPC_CALIBRATE:
-        begin_home(c, when, command->op);
+        begin_home(c, when, command->op, true);
         break;
     case DR_OP_TRIO_WORK:
     case DR_OP_MPC_WORK:
-        begin_work(c, when, command->op);
+        begin_work(c, when, command->op, true);
         break;
     case DR_OP_MPC_CENTRE:
-        begin_centre(c, when, command->op);
+        begin_centre(c, when, command->op, true);
         break;
     default:
         begin_targeted(c, when, request);
@@ -650,7 +664,7 @@ static void lose(dr_controller *c, dr_us now, uint8_t op, size_t count)
 
 static void wedge(dr_controller *c, dr_us now, uint8_t op)
 {
-    if (c->state == DR_STATE_MOVING)
+    if (is_moving(c))
         halt(c, now);
     c->state = DR_STATE_WEDGED;
     c->out_at = c->out_bytes = c->interrupt_crs = c->kept_bytes = 0;
@@ -660,7 +674,7 @@ static void wedge(dr_controller *c, dr_us now, uint8_t op)
 /* ^C at a frame boundary. An MPC-200 stops any move; a TRIO stops 'S' and does not hear it during any other [T 12, M 14]. */
 static void interrupt(dr_controller *c, dr_us now, uint8_t op)
 {
-    if (c->state == DR_STATE_MOVING) {
+    if (is_moving(c)) {
         if (c->kind == DR_TRIO && c->move_op != DR_OP_TRIO_LINE) {
             note_value(c, now, DR_NOTE_STOP_IGNORED, c->move_op, 0);
             return;
@@ -688,7 +702,7 @@ static void arrive(dr_controller *c, dr_us now, const dr_command *command)
     note_bytes(c, now, DR_NOTE_REQUEST, command->op, c->framer.bytes, length, 0);
     if ((command->is & DR_IS_INTERRUPT) != 0) {
         interrupt(c, now, command->op);
-    } else if ((queries && has_quirk(c, DR_QUIRK_QUERY_WEDGES) && c->state == DR_STATE_MOVING) ||
+    } else if ((queries && has_quirk(c, DR_QUIRK_QUERY_WEDGES) && is_moving(c)) ||
                (hurries && has_quirk(c, DR_QUIRK_S_NEEDS_PAUSE))) {
         wedge(c, now, command->op);
     } else if (c->state == DR_STATE_REST && c->kept_bytes == 0 && dr_controller_ready(c) == 0) {
@@ -763,8 +777,8 @@ size_t dr_controller_pull(dr_controller *c, dr_us now, uint8_t *bytes, size_t ro
 
 void dr_controller_position(const dr_controller *c, uint8_t drive, dr_us now, uint32_t steps[DR_AXES])
 {
-    if (c->state == DR_STATE_MOVING && drive == c->active)
-        dr_leg_at(&c->leg, now - c->leg_began, steps);
+    if (is_moving(c) && drive == c->active)
+        dr_leg_at(&c->leg, leg_elapsed_us(c, now), steps);
     else
         copy_point(steps, c->drives[drive].position_steps);
 }
@@ -780,7 +794,7 @@ static void forget_line(dr_controller *c)
 
 static void power_off(dr_controller *c, dr_us now)
 {
-    if (c->state == DR_STATE_MOVING)
+    if (is_moving(c))
         halt(c, now);
     forget_line(c);
     c->move_is_paused = false;
@@ -821,10 +835,12 @@ static void connect(dr_controller *c, dr_us now, const dr_hand *hand)
     dr_drive *drive = &c->drives[hand->drive];
     dr_stage stage;
     const bool in_use = hand->drive == c->active;
-    if (in_use && c->state == DR_STATE_MOVING) {
+    if (in_use && is_moving(c)) {
         halt(c, now);
-        c->state = DR_STATE_STRANDED;
-        note_value(c, now, DR_NOTE_STRANDED, c->move_op, 0);
+        if (c->move_answers) {
+            c->state = DR_STATE_STRANDED;
+            note_value(c, now, DR_NOTE_STRANDED, c->move_op, 0);
+        }
     }
     drive->stage = hand->stage;
     drive->at_home = false;
@@ -876,6 +892,117 @@ bool dr_controller_poke(dr_controller *c, dr_us now, const dr_hand *hand)
     default:
         return false;
     }
+}
+
+/* -- The panel's effects ---------------------------------------------------------------------------------------------- */
+
+static bool is_possible(const dr_controller *c, dr_effect effect, uint8_t value)
+{
+    const bool trio = c->kind == DR_TRIO;
+    if (!is_connected(c, c->active))
+        return false;
+    switch (effect) {
+    case DR_EFFECT_PAUSE:
+        return c->state == DR_STATE_MOVING && (c->move_op == DR_OP_TRIO_HOME || c->move_op == DR_OP_TRIO_WORK);
+    case DR_EFFECT_RESUME:
+        return c->state == DR_STATE_PAUSED;
+    case DR_EFFECT_STOP:
+        return !trio && (c->state == DR_STATE_MOVING || c->state == DR_STATE_STRANDED);
+    default:
+        break;
+    }
+    if (c->state != DR_STATE_REST)
+        return false;
+    switch (effect) {
+    case DR_EFFECT_CALIBRATE:
+        return !trio;
+    case DR_EFFECT_SELECT:
+        return !trio && is_connected(c, value);
+    case DR_EFFECT_MODE:
+        return !trio && value <= MODE_LAST;
+    case DR_EFFECT_ANGLE:
+        return trio && value <= DR_ANGLE_MAX_DEG;
+    case DR_EFFECT_STORE_HOME:
+        return trio;
+    default:
+        return true;
+    }
+}
+
+/* STOP on the ROE ends any move; the host's sends its one CR all the same [O]. */
+static void stop_by_hand(dr_controller *c, dr_us now)
+{
+    if (c->state == DR_STATE_MOVING)
+        halt(c, now);
+    c->state = DR_STATE_REST;
+    if (c->move_answers) {
+        answer_cr(c, now, c->move_op);
+        c->out_op = (uint8_t)(c->move_op | STOPPED_BY_HAND);
+    }
+}
+
+static void begin_by_hand(dr_controller *c, dr_us now, dr_effect effect)
+{
+    dr_command command;
+    if (effect == DR_EFFECT_HOME)
+        begin_home(c, now, c->kind == DR_TRIO ? DR_OP_TRIO_HOME : DR_OP_MPC_HOME, false);
+    else if (effect == DR_EFFECT_WORK)
+        begin_work(c, now, c->kind == DR_TRIO ? DR_OP_TRIO_WORK : DR_OP_MPC_WORK, false);
+    else if (dr_command_for(kind_of(c), c->firmware, DR_OP_MPC_CENTRE, &command))
+        begin_centre(c, now, DR_OP_MPC_CENTRE, false);
+    else
+        begin_home(c, now, DR_OP_MPC_CALIBRATE, false);
+}
+
+bool dr_controller_apply(dr_controller *c, dr_us now, dr_effect effect, uint8_t value)
+{
+    bool done = true;
+    dr_drive *drive;
+    settle(c, now);
+    if (!is_possible(c, effect, value))
+        return false;
+    note_bytes(c, now, DR_NOTE_HAND, DR_OP_NONE, &value, 1, effect);
+    drive = active_drive(c);
+    switch (effect) {
+    case DR_EFFECT_HOME:
+    case DR_EFFECT_WORK:
+    case DR_EFFECT_CALIBRATE:
+        begin_by_hand(c, now, effect);
+        done = c->state == DR_STATE_MOVING;
+        c->move_is_paused = c->move_is_paused && !done;
+        break;
+    case DR_EFFECT_PAUSE:
+        c->leg_began = now - c->leg_began;
+        c->state = DR_STATE_PAUSED;
+        break;
+    case DR_EFFECT_RESUME:
+        c->leg_began = now - c->leg_began;
+        c->state = DR_STATE_MOVING;
+        break;
+    case DR_EFFECT_STOP:
+        stop_by_hand(c, now);
+        break;
+    case DR_EFFECT_SELECT:
+        if (c->active != value)
+            c->move_is_paused = false;
+        c->active = value;
+        break;
+    case DR_EFFECT_MODE:
+        drive->mode = value;
+        break;
+    case DR_EFFECT_ANGLE:
+        c->angle_deg = value;
+        break;
+    case DR_EFFECT_STORE_HOME:
+        copy_point(c->home_steps, drive->position_steps);
+        break;
+    case DR_EFFECT_STORE_WORK:
+        copy_point(drive->work_steps, drive->position_steps);
+        drive->work_is_set = true;
+        break;
+    }
+    settle(c, now);
+    return done;
 }
 
 /* -- Setting up ------------------------------------------------------------------------------------------------------ */

@@ -4,7 +4,8 @@
  * value: copy it, and the copy goes on alike (but for the drives and notes it points to).
  *
  *     push    the host's bytes have arrived             pull   bytes for the host have left
- *     due     when something will happen by itself      poke   what hands do: power, plugs, knobs
+ *     due     when something will happen by itself      poke   what hands do to the box: power, plugs, knobs
+ *                                                       apply  what the buttons of its panel ask for (dr_panel.h)
  *
  * `now` never goes back. Every call first settles what was due by `now`, in order of time. A caller that comes at each
  * due instant gets every byte at its exact time; one that comes later finds the same moves and replies, but of streamed
@@ -71,7 +72,8 @@ typedef enum {
     DR_STATE_REST,
     DR_STATE_MOVING,
     DR_STATE_STRANDED,   /* the move is over and its CR never comes: DR_QUIRK_ENDLESS_NEGATIVE, an unplugged drive */
-    DR_STATE_WEDGED      /* silent until a power cycle */
+    DR_STATE_WEDGED,     /* silent until a power cycle */
+    DR_STATE_PAUSED      /* TRIO: its own button holds a move to home or work; still a move, but no time passes in it */
 } dr_state;
 
 #define DR_KEPT_MAX 64u  /* bytes of commands that came too early [P] */
@@ -104,7 +106,8 @@ typedef struct {
     bool move_is_paused;                    /* DR_QUIRK_PAUSE_ON_STOP: waits to be resumed */
     uint32_t move_to_steps[DR_AXES];        /* where it goes in the end */
     dr_leg leg;
-    dr_us leg_began;                        /* in DR_STATE_BOOTING: when the boot began */
+    dr_us leg_began;                        /* in DR_STATE_BOOTING: when the boot began; in DR_STATE_PAUSED: a span, how
+                                             * much of the leg is done */
     uint32_t microns_streamed;
 
     dr_framer framer;                       /* the frame that is arriving */
@@ -114,7 +117,7 @@ typedef struct {
 
     uint8_t out[DR_REPLY_MAX];              /* the reply or streamed frame that is leaving */
     uint8_t out_at, out_bytes;
-    uint8_t out_op;                         /* dr_op that it answers */
+    uint8_t out_op;                         /* dr_op that it answers; the top bit: STOP on the ROE ended that move */
     uint8_t interrupt_crs;                  /* answers to ^C that follow it */
 } dr_controller;
 
@@ -134,6 +137,9 @@ size_t dr_controller_pull(dr_controller *c, dr_us now, uint8_t *bytes, size_t ro
 size_t dr_controller_ready(const dr_controller *c);
 /* Which command's answer the next byte to be pulled belongs to, and whether that byte is the answer's first. */
 dr_op dr_controller_answering(const dr_controller *c, bool *first);
+/* Whether the next byte to be pulled is the CR of a host's move that STOP on the ROE has ended (DR_EFFECT_STOP). It is that
+ * move's one CR; a layer that plays the quirk stop-says-i sends 'I' in its place. */
+bool dr_controller_answers_stop(const dr_controller *c);
 /* When something will happen by itself: false: never, as things are; no instant is kept while nothing moves. Bytes that
  * wait to be pulled are not counted: whether they can leave is the caller's to know. */
 bool dr_controller_due(const dr_controller *c, dr_us *when);
@@ -159,6 +165,29 @@ typedef struct {
 
 /* False: it cannot be done now (the knobs are dead during moves, and without power). */
 bool dr_controller_poke(dr_controller *c, dr_us now, const dr_hand *hand);
+
+/* What the buttons of a controller's panel ask for, by dr_panel or by wired buttons. A move that is begun here has no CR. The
+ * whole of it is one function that a build without panel does not link.
+ *
+ * A pause keeps how much of the leg is done, in whole microseconds, and going on moves the leg's beginning to that much
+ * before now: the rest is the same function of time, so a pause at any instant, for any time, gains and loses no step. */
+typedef enum {
+    DR_EFFECT_HOME,
+    DR_EFFECT_WORK,
+    DR_EFFECT_CALIBRATE, /* MPC; up to firmware 1.03 it centres, as 'N' does [M table 9] */
+    DR_EFFECT_PAUSE,     /* TRIO: a move to home or work, the host's 'h' and 'w' too */
+    DR_EFFECT_RESUME,
+    DR_EFFECT_STOP,      /* MPC: any move; a host's sends its one CR now, see dr_controller_answers_stop() */
+    DR_EFFECT_SELECT,    /* MPC: value = drive (index) */
+    DR_EFFECT_MODE,      /* MPC: value = 0..9, of the active drive */
+    DR_EFFECT_ANGLE,     /* TRIO: value = 0..90 degrees */
+    DR_EFFECT_STORE_HOME,/* TRIO: home is where it stands */
+    DR_EFFECT_STORE_WORK /* the active drive's work position is where it stands */
+} dr_effect;
+
+/* False: it cannot be done now. Pause and stop need a move, resume a paused one, everything else a controller at rest; a
+ * move to the work position needs one that is stored and, on an MPC-200, a drive at home, as 'Y' does. */
+bool dr_controller_apply(dr_controller *c, dr_us now, dr_effect effect, uint8_t value);
 
 /* -- Notes: what happened, in order, for traces and judges ------------------------------------------------------------ */
 
@@ -188,6 +217,7 @@ typedef enum {
     DR_NOTE_POWER_OFF,
     DR_NOTE_POWER_ON,
     DR_NOTE_CONNECTED,   /* value = dr_stage_id */
+    DR_NOTE_HAND,        /* a button of the panel: value = dr_effect, bytes[0] = the effect's value */
     DR_NOTE_PLACED       /* by hand: steps = where */
 } dr_note_kind;
 

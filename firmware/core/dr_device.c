@@ -166,3 +166,23 @@ dr_diagonal dr_diagonal_get(uint8_t value)
     DR_ROM_READ(&direction, &diagonals[value % DR_DIAGONALS]);
     return direction;
 }
+
+/* 32768 * sin(degrees), rounded. */
+static const uint16_t DR_ROM sines[DR_ANGLE_MAX_DEG + 1u] = {
+    0, 572, 1144, 1715, 2286, 2856, 3425, 3993, 4560, 5126, 5690, 6252, 6813, 7371,
+    7927, 8481, 9032, 9580, 10126, 10668, 11207, 11743, 12275, 12803, 13328, 13848, 14365, 14876,
+    15384, 15886, 16384, 16877, 17364, 17847, 18324, 18795, 19261, 19720, 20174, 20622, 21063, 21498,
+    21926, 22348, 22763, 23170, 23571, 23965, 24351, 24730, 25102, 25466, 25822, 26170, 26510, 26842,
+    27166, 27482, 27789, 28088, 28378, 28660, 28932, 29197, 29452, 29698, 29935, 30163, 30382, 30592,
+    30792, 30983, 31164, 31336, 31499, 31651, 31795, 31928, 32052, 32166, 32270, 32365, 32449, 32524,
+    32588, 32643, 32688, 32723, 32748, 32763, 32768,
+};
+
+dr_diagonal dr_angle_get(uint8_t angle_deg)
+{
+    const uint8_t deg = angle_deg < DR_ANGLE_MAX_DEG ? angle_deg : DR_ANGLE_MAX_DEG;
+    dr_diagonal direction;
+    DR_ROM_READ(&direction.cos, &sines[DR_ANGLE_MAX_DEG - deg]);
+    DR_ROM_READ(&direction.sin, &sines[deg]);
+    return direction;
+}

@@ -179,9 +179,11 @@ uint32_t dr_measured_quanta_per_s(uint8_t level);
 #define DR_DIAGONALS 16u                /* MPC-200 switches 1-4 as a number, switch 1 the lowest bit [M table 2] */
 #define DR_DIAGONAL_DEFAULT 10u         /* 29 degrees, less steep than 45: switches 0,1,0,1 */
 
-/* Direction of an MPC diagonal: X moves by cos where Z moves by sin, both times 32768. */
+/* Direction of a diagonal: X moves by cos where Z moves by sin, both times 32768. */
 typedef struct { uint16_t cos, sin; } dr_diagonal;
 dr_diagonal dr_diagonal_get(uint8_t value);
+/* The same for an angle of a TRIO, 0 to 90 degrees: its D axis [T page 1, P]. */
+dr_diagonal dr_angle_get(uint8_t angle_deg);
 
 #ifdef __cplusplus
 }

@@ -678,10 +678,52 @@ const char *dr_words_note_name(dr_note_kind kind)
         return "power-on";
     case DR_NOTE_CONNECTED:
         return "connected";
+    case DR_NOTE_HAND:
+        return "hand";
     case DR_NOTE_PLACED:
         return "placed";
     }
     return "?";
+}
+
+/* What a button of the panel has asked for. */
+static void add_effect(text *t, dr_effect effect, uint8_t value)
+{
+    switch (effect) {
+    case DR_EFFECT_HOME:
+        add(t, "go home");
+        return;
+    case DR_EFFECT_WORK:
+        add(t, "go to work");
+        return;
+    case DR_EFFECT_CALIBRATE:
+        add(t, "calibrate");
+        return;
+    case DR_EFFECT_PAUSE:
+        add(t, "pause");
+        return;
+    case DR_EFFECT_RESUME:
+        add(t, "go on");
+        return;
+    case DR_EFFECT_STOP:
+        add(t, "stop");
+        return;
+    case DR_EFFECT_SELECT:
+        add(t, "select drive %u", value + 1u);
+        return;
+    case DR_EFFECT_MODE:
+        add(t, "set mode %u", value);
+        return;
+    case DR_EFFECT_ANGLE:
+        add(t, "set the angle to %u degrees", value);
+        return;
+    case DR_EFFECT_STORE_HOME:
+        add(t, "this place is home");
+        return;
+    case DR_EFFECT_STORE_WORK:
+        add(t, "this place is the work position");
+        return;
+    }
 }
 
 static int axis_of(uint32_t value) { return value < DR_AXES ? axis_letters[value] : '?'; }
@@ -791,6 +833,10 @@ size_t dr_words_note(char *out, size_t room, const dr_words_context *context, co
             add(&t, "port %u was unplugged", drive);
         else
             add(&t, "%s was plugged into port %u", dr_words_stage((dr_stage_id)note->value), drive);
+        break;
+    case DR_NOTE_HAND:
+        add(&t, "by hand: ");
+        add_effect(&t, (dr_effect)note->value, note->bytes[0]);
         break;
     }
     return t.length;
