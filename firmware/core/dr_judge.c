@@ -402,7 +402,7 @@ static bool keeps_to_line(const dr_drive_limits *d, const dr_path *path)
     for (uint8_t corner = 0; corner < corners; corner++) {
         int32_t move_q[DR_AXES];
         for (uint8_t axis = 0; axis < DR_AXES; axis++) {
-            const bool moves = path->straight || (corner >> axis & 1u) != 0;
+            const bool moves = path->straight || (((unsigned)corner >> axis) & 1u) != 0;
             move_q[axis] = moves ? path->line.to_q[axis] - path->line.from_q[axis] : 0;
         }
         if (!dr_is_along(move_q, d->approach, DR_LATERAL_TOLERANCE_Q))

@@ -235,7 +235,7 @@ static bool is_within(int64_t value, int64_t min, int64_t max) { return min <= v
 static bool is_version(uint16_t firmware)
 {
     for (uint8_t digit = 0; digit < 4; digit++)
-        if ((firmware >> (4u * digit) & 0xFu) > 9u)
+        if ((((unsigned)firmware >> (4u * digit)) & 0xFu) > 9u)
             return false;
     return firmware >= DR_FIRMWARE_FIRST;
 }
