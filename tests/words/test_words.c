@@ -370,6 +370,10 @@ static void test_notes(void)
           .count = 1);
     NOTES("by hand: this place is home", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_STORE_HOME);
     NOTES("by hand: this place is the work position", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_STORE_WORK);
+    NOTES("by hand: go home", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_HOME);
+    NOTES("by hand: select drive 2", mpc, .what = DR_NOTE_HAND, .value = DR_EFFECT_SELECT, .bytes = {1}, .count = 1);
+    NOTES("by hand: set the angle to 45 degrees", trio, .what = DR_NOTE_HAND, .value = DR_EFFECT_ANGLE, .bytes = {45},
+          .count = 1);
     NOTES("port 3 was unplugged", mpc, .what = DR_NOTE_CONNECTED, .drive = 2, .value = DR_STAGE_NONE);
 }
 
