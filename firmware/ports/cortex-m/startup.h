@@ -1,0 +1,13 @@
+/* Which interrupts of the chip are used; mps2-an385: its CMSDK UART 0 (receive) and TIMER 0. */
+#ifndef DR_STARTUP_H
+#define DR_STARTUP_H
+
+#define DR_INTERRUPTS 32
+#define DR_INTERRUPT_UART 0
+#define DR_INTERRUPT_TIMER 8
+
+void dr_interrupt_uart(void);
+void dr_interrupt_timer(void);
+void dr_fault(void);
+
+#endif
