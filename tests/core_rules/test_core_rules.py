@@ -1,4 +1,5 @@
-"""A check that cannot fail checks nothing: puts one violation of each kind into a copy of the core and sees it caught.
+"""A check that cannot fail checks nothing: puts one violation of each kind into a copy of a part of the
+core and sees it caught.
 
     test_core_rules.py DIRECTORY    (of the core)
 """
@@ -17,8 +18,11 @@ class CoreRules(unittest.TestCase):
     def setUp(self):
         temporary = tempfile.TemporaryDirectory()
         self.addCleanup(temporary.cleanup)
-        self.core = Path(temporary.name, "core")
-        shutil.copytree(CORE, self.core)
+        self.core = Path(temporary.name)
+        for name in ("dr_device", "dr_wire", "dr_motion"): # a small core that stands by itself
+            for suffix in (".c", ".h"):
+                shutil.copy(CORE / (name + suffix), self.core)
+        shutil.copy(CORE / "CMakeLists.txt", self.core)
 
     def check(self):
         return subprocess.run([sys.executable, CHECK, self.core], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -46,7 +50,7 @@ class CoreRules(unittest.TestCase):
             (self.core / "dr_motion.c").write_text(before)
             self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
 
-    def test_the_core_as_it_is(self):
+    def test_the_copy_as_it_is(self):
         done = self.check()
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
 
@@ -74,7 +78,7 @@ class CoreRules(unittest.TestCase):
         self.passes("#include <string.h>")
 
     def test_layers(self):
-        self.caught("layer", '#include "dr_controller.h"')
+        self.caught("layer", '#include "dr_wire.h"')
         self.caught("layer", "int dr_wire_axis(int);\nint dr_more(void);\nint dr_more(void) { return dr_wire_axis(1); }")
         self.passes("int dr_angle_test(void);\nint dr_angle_test(void) { dr_stage s; return dr_stage_get(DR_STAGE_NONE, &s); }")
         (self.core / "dr_more.c").write_text('#include "dr_device.h"\n')
