@@ -77,7 +77,7 @@ def loops(text, code):
         else:
             condition, step = (inside.split(";") + ["", ""])[1:3]
             endless = re.fullmatch(r"\s*(1|true)?\s*", condition)
-            bounded = stated or re.search(r"[<>]|!=", condition) and re.search(r"\+\+|--|[-+]=|<<=|>>=", step)
+            bounded = stated or re.search(r"[<>]|!=", condition) and re.search(r"\+\+|--|[-+*/]=|<<=|>>=", step)
         if endless:
             yield found.start(), "loop", "endless"
         elif not bounded:
