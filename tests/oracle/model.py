@@ -162,6 +162,8 @@ class Controller:
             return False
         if self.state == 'moving':
             self.drive.position = self.leg.at(t - self.began)
+        for drive in self.drives:
+            drive.at_home = False  # positions and work are kept over power-off [P], and no more
         self.reset()
         return True
 
