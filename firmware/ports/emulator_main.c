@@ -81,11 +81,6 @@ static bool tell(dr_us now, dr_us *when)
     if (room > sizeof bytes)
         room = sizeof bytes;
     if (!dr_port_has_pace()) {
-        if (dr_controller_ready(&controller) == 0) {
-            (void)dr_controller_pull(&controller, now, bytes, 0); /* settles what is due */
-            line_at = now;
-            line_at_ns = 0;
-        }
         const size_t can = carried(now);
         room = can < room ? can : room;
     }
@@ -108,9 +103,14 @@ void dr_emulator_step(void)
 {
     const dr_us now = dr_port_now_us();
     dr_us until = now, other;
+    if (dr_controller_ready(&controller) == 0) {
+        line_at = now;
+        line_at_ns = 0;
+    }
     hear(now);
     bool has_end = tell(now, &until);
-    sooner(dr_controller_due(&controller, &other), other, &has_end, &until);
+    const bool moves = dr_controller_due(&controller, &other);
+    sooner(moves, other, &has_end, &until);
     const bool keeps = dr_keep_step(&keep, &controller, now, &other);
     sooner(keeps, other, &has_end, &until);
     dr_port_wait(has_end, until);

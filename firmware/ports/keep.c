@@ -157,8 +157,10 @@ bool dr_keep_step(dr_keep *keep, const dr_controller *c, dr_us now, dr_us *when)
     }
     if (!keep->is_changed)
         return false;
-    if (c->state == DR_STATE_MOVING)
-        keep->since = now; /* nothing is written before it has ended, and the end wakes the board */
+    const bool is_moving = c->state == DR_STATE_MOVING;
+    if (is_moving || keep->is_moving)
+        keep->since = now; /* the second begins when the move has ended */
+    keep->is_moving = is_moving;
     *when = keep->since + DR_KEEP_AFTER_US;
     if (dr_us_before(now, *when))
         return true;

@@ -20,7 +20,7 @@ typedef struct {
     uint16_t newest;                    /* slot of the record that counts; no slot yet: the last one */
     uint16_t serial;                    /* its number */
     dr_us since;                        /* when things last changed; counts while is_changed */
-    bool is_changed, is_writing;
+    bool is_changed, is_moving, is_writing;
 } dr_keep;
 
 /* Sets a controller that is off as the newest record says. False: there is no record of this controller and these stages,
