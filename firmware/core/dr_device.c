@@ -63,9 +63,11 @@ static const dr_command DR_ROM mpc_commands[] = {
 
 #define ROWS(table) (sizeof(table) / sizeof(table)[0])
 
+static uint8_t row_count(dr_kind kind) { return kind == DR_TRIO ? ROWS(trio_commands) : ROWS(mpc_commands); }
+
 bool dr_command_row(dr_kind kind, uint8_t index, dr_command *out)
 {
-    if (index >= (kind == DR_TRIO ? ROWS(trio_commands) : ROWS(mpc_commands)))
+    if (index >= row_count(kind))
         return false;
     DR_ROM_READ(out, kind == DR_TRIO ? &trio_commands[index] : &mpc_commands[index]);
     return true;
@@ -75,9 +77,13 @@ static bool known(const dr_command *row, uint16_t firmware) { return row->since 
 
 bool dr_command_find(dr_kind kind, uint16_t firmware, uint8_t code, dr_command *out)
 {
-    for (uint8_t i = 0; dr_command_row(kind, i, out); i++) /* at most the rows of the table */
-        if (out->code == code && known(out, firmware))
+    const uint8_t rows = row_count(kind);
+    for (uint8_t i = 0; i < rows; i++) {
+        uint8_t row_code; /* alone at first: on an AVR to copy whole rows takes longer than the line's next byte */
+        DR_ROM_READ(&row_code, kind == DR_TRIO ? &trio_commands[i].code : &mpc_commands[i].code);
+        if (row_code == code && dr_command_row(kind, i, out) && known(out, firmware))
             return true;
+    }
     return false;
 }
 

@@ -2,4 +2,6 @@
 #include <avr/pgmspace.h>
 
 #define DR_ROM PROGMEM
-#define DR_ROM_READ(to, from) ((void)memcpy_P((to), (from), sizeof *(to)))
+#define DR_ROM_READ(to, from)                                                                                          \
+    ((void)(sizeof *(to) == 1 ? (*(uint8_t *)(to) = pgm_read_byte(from), (void *)0)                                    \
+                              : memcpy_P((to), (from), sizeof *(to))))
