@@ -19,8 +19,8 @@
 #ifndef DR_GUARD_H
 #define DR_GUARD_H
 
-#include "dr_judge.h"  /* dr_limits, dr_verdict, dr_scene */
-
+#include "dr_judge.h" /* dr_limits, dr_verdict, dr_scene, dr_path */
+#include "dr_log.h"   /* dr_record */
 
 #ifdef __cplusplus
 extern "C" {
@@ -116,26 +116,6 @@ typedef enum {
     DR_STOP_AFTER_RESET, DR_STOP_NOISE
 } dr_stop_cause;
 
-#define DR_RECORD_TEXT 16u
-typedef struct {
-    uint32_t sequence;                      /* from 0 at start */
-    dr_us when;
-    uint8_t event;                          /* dr_event */
-    uint8_t before, after;                  /* dr_guard_state */
-    uint8_t code, axis, item;
-    uint8_t op;                             /* dr_op that it is about */
-    uint8_t count;                          /* of bytes; stops at 255; DR_RECORD_TEXT of them are kept */
-    uint8_t bytes[DR_RECORD_TEXT];
-    uint32_t position_steps[DR_AXES];
-    uint32_t crc;                           /* CRC-32C of the record before, chained over all of this but crc */
-} dr_record;
-#define DR_RECORD_BYTES 48u
-
-/* The record as stored or sent: DR_RECORD_BYTES, fields in the order above, little-endian. */
-void dr_record_put(const dr_record *record, uint8_t *bytes);
-/* The crc that the record must have after one with crc `before` (0 before the first). */
-uint32_t dr_record_crc(uint32_t before, const dr_record *record);
-
 /* -- The guard ------------------------------------------------------------------------------------------------------ */
 
 typedef enum {
@@ -154,68 +134,81 @@ typedef enum {
 
 /* Instants at which the guard acts by itself. */
 enum {
-    DR_TIMER_FRAME, DR_TIMER_RESYNC, DR_TIMER_TASK, DR_TIMER_READ, DR_TIMER_STOP, DR_TIMER_REPEAT, DR_TIMER_SEND,
-    DR_TIMER_IDLE, DR_TIMER_RATE, DR_TIMER_NOISE, DR_TIMER_STALE, DR_TIMER_WIRING, DR_TIMER_RELEASE, DR_TIMERS
+    DR_TIMER_FRAME,      /* the host's frame is not finished in time */
+    DR_TIMER_RESYNC,     /* the host has paused */
+    DR_TIMER_TASK,       /* see dr_task */
+    DR_TIMER_READ,       /* the guard's own query: its turn, its deadline, quiet before the second try */
+    DR_TIMER_SEND,       /* the pause before a motion frame, or within 'S' */
+    DR_TIMER_PROOF,      /* rest not proved in time */
+    DR_TIMER_REPEAT,     /* ^C again */
+    DR_TIMER_IDLE,       /* armed without a motion */
+    DR_TIMER_RATE,       /* one more motion may start */
+    DR_TIMER_NOISE,      /* a second of bytes that nobody asked for is over */
+    DR_TIMER_STALE,      /* a knob may have gone anywhere since the last reading */
+    DR_TIMER_WIRING,     /* the stop contacts disagree */
+    DR_TIMER_RELEASE,    /* the stop contacts have stopped bouncing */
+    DR_TIMERS
 };
 
 #define DR_HOST_OUT_MAX 64u
 
 typedef struct {
-    /* everything here belongs to dr_guard; ask dr_guard_get_status() */
-    const dr_limits *limits;
+    /* everything here belongs to dr_guard; others ask dr_guard_get_status() */
+    const dr_limits *limits;                /* NULL: none, or no longer trusted */
     uint32_t limits_crc;
-    dr_record *ring;
-    uint16_t ring_size, ring_first, ring_count;
-    uint32_t ring_missed, sequence, crc;
-
+    dr_log log;
     uint8_t mode, mode_inverse;             /* kept twice: a flipped bit must not arm */
     uint8_t fault, shown_state;
     uint16_t inputs;                        /* bit per dr_input */
-    bool host_open, device_present, wiring_alarm, proved, profile_known, confirmed, tip_changed, unsteady, ambiguous;
-    bool cut, buzzer, stop_latched;
+    bool host_open, device_present;
+    bool after_reset;                       /* a ^C goes first when the device is there */
+    bool proved;                            /* it is the controller of the limits */
+    bool other_firmware;                    /* it said so itself */
+    bool ambiguous;                         /* it may be: CONFIRM decides */
+    bool confirmed, tip_changed, unsteady, wiring_alarm, stop_latched, cut, buzzer;
 
     dr_us at[DR_TIMERS];
     uint16_t running;                       /* bit per timer */
-    dr_us frame_began;
 
     dr_framer framer;                       /* the host's frame that is arriving */
-    bool resync, tainted, frame_has_stop;
-    uint8_t dropped[DR_RECORD_TEXT];        /* host bytes that were no frame, for one record */
-    uint16_t dropped_count;
-    uint8_t dropped_reason;
+    dr_us frame_began;
+    bool resync, tainted;                   /* tainted: a byte of the frame came while something was under way */
+    uint8_t dropped[DR_RECORD_TEXT], dropped_count, dropped_reason; /* host bytes that were no frame, for one record */
 
-    uint8_t task, task_phase;               /* what is under way on the device's side */
-    dr_command command;                     /* the command that is pending, under way or passed on */
+    uint8_t task;                           /* dr_task of dr_guard.c: what is under way on the device's side */
+    dr_command command;                     /* that is pending, under way or passed on */
     dr_request request;
     uint8_t frame[DR_FRAME_MAX];
-    uint8_t reply_have, reply_want, stream_left, passes; /* of the reply that is awaited */
-    uint8_t reply[DR_REPLY_MAX];
+    uint8_t reply[DR_REPLY_MAX], reply_have, reply_want; /* to a command that was passed on */
+    uint8_t stream_left;                    /* bytes to come of a streamed position */
+    uint8_t attempts;                       /* at the proof of identity */
 
-    uint8_t read_phase, read_have;          /* the guard's own position query */
+    uint8_t read_phase;                     /* of the guard's own position query */
+    uint8_t read[DR_REPLY_MAX], read_have;
     bool read_again;
-    uint8_t read[DR_REPLY_MAX];
-    uint32_t first_steps[DR_AXES];          /* of two readings that must agree */
-    bool has_first;
+    bool has_first;                         /* first_steps holds the first of two readings that must agree */
+    uint32_t first_steps[DR_AXES];
 
-    uint8_t out[DR_FRAME_MAX];              /* to the device: one frame or query */
-    uint8_t out_at, out_count, out_ready;   /* out_ready: how many may leave now (the pause within 'S') */
+    uint8_t out[DR_FRAME_MAX], out_at, out_count; /* to the device: one frame or query */
+    uint8_t out_ready;                      /* how many bytes of it may leave by now */
     uint8_t stops_out;                      /* ^C that wait to leave */
-    uint8_t to_host[DR_HOST_OUT_MAX];
-    uint8_t to_host_first, to_host_count;
+    uint8_t to_host[DR_HOST_OUT_MAX], to_host_first, to_host_count;
 
-    uint8_t stop_owed, stop_crs, stop_sent, stop_skip; /* CRs owed to the host, seen; ^C sent; reply bytes to come first */
-    uint8_t stop_fault;                     /* dr_fault when rest is proved */
-    bool stop_unsure, moved;
+    uint8_t stop_owed, stop_crs;            /* CRs that the host's own ^C may have; CRs that came */
+    uint8_t stop_sent, stop_skip;           /* ^C sent; reply bytes that come before their answer */
+    uint8_t stop_fault;                     /* dr_fault once rest is proved */
+    bool stop_broke_off;                    /* a motion: its target stays possible */
+    bool stop_waits;                        /* for the end of a motion that cannot be stopped */
 
-    dr_path path;                           /* of the move under way */
-    uint32_t move_from[DR_AXES];
-    bool move_small;
+    dr_path path;                           /* of the motion under way */
+    uint8_t path_drive;
+    bool end_told, small;                   /* the motion's CR is there; so short that it may never come */
     uint8_t tokens;                         /* motions that may start now */
-    uint8_t noise;
+    uint8_t noise, quarantined[DR_RECORD_TEXT], quarantined_count;
 
-    dr_scene scene;                         /* what is known: position, drive, angle, interrupted move */
-    bool position_known, position_stale;
-    dr_us position_at;
+    dr_scene scene;                         /* what is known of the place */
+    bool position_known;
+    dr_us position_at;                      /* while DR_TIMER_STALE runs */
 
     uint8_t last_op;
     dr_verdict last_refusal;

@@ -432,16 +432,21 @@ static dr_verdict judge_surface(const dr_limits *l, const dr_scene *scene, const
                : allowed;
 }
 
-/* What ^C broke off may be resumed by the next motion: that way must be clear too. */
-static dr_verdict judge_old_target(const dr_limits *l, const dr_scene *scene, int32_t margin_q)
+/* What ^C broke off, on any drive, may be resumed by the next motion: that way must be clear too. */
+static dr_verdict judge_old_moves(const dr_limits *l, const dr_scene *scene, int32_t margin_q)
 {
-    if (!scene->interrupted)
-        return allowed;
-    int32_t at_q[DR_AXES];
-    to_quanta(scene->old_drive == scene->drive ? scene->start_steps : scene->old_at_steps,
-              stage_of(l, scene->old_drive).quanta_per_step, at_q);
-    const dr_box at = point(at_q), way = hull(&at, &scene->old_target_q);
-    return judge_box_clear(l, scene->old_drive, &way, margin_q, DR_REASON_OLD_TARGET);
+    for (uint8_t drive = 0; drive < DR_PORTS; drive++) {
+        const dr_old_move *old = &scene->old[drive];
+        int32_t at_q[DR_AXES];
+        if (!old->is_open)
+            continue;
+        to_quanta(drive == scene->drive ? scene->start_steps : old->at_steps, stage_of(l, drive).quanta_per_step, at_q);
+        const dr_box at = point(at_q), way = hull(&at, &old->target_q);
+        const dr_verdict verdict = judge_box_clear(l, drive, &way, margin_q, DR_REASON_OLD_TARGET);
+        if (!is_allowed(verdict))
+            return verdict;
+    }
+    return allowed;
 }
 
 /* -- The whole ----------------------------------------------------------------------------------------------------------- */
@@ -485,7 +490,7 @@ dr_verdict dr_judge_motion(const dr_limits *l, const dr_scene *scene, const dr_c
         return refuse(DR_REASON_FRAME_LOST, DR_AXES, 0, 0);
     dr_verdict verdict = judge_where(l, scene, command, &path, margin_q);
     if (is_allowed(verdict))
-        verdict = judge_old_target(l, scene, margin_q);
+        verdict = judge_old_moves(l, scene, margin_q);
     if (is_allowed(verdict))
         verdict = judge_step(&l->drives[scene->drive], &path);
     if (is_allowed(verdict) && (command->is & DR_IS_STOPPABLE) == 0)

@@ -59,6 +59,13 @@ typedef struct {
 } dr_verdict;
 #define DR_NO_ITEM 0xFFu
 
+/* A move that ^C broke off: the controller may resume it instead of the next motion. */
+typedef struct {
+    bool is_open;
+    uint32_t at_steps[DR_AXES];             /* at rest here since */
+    dr_box target_q;                        /* on its way to within here */
+} dr_old_move;
+
 /* What the guard knows when a motion is asked for. */
 typedef struct {
     uint32_t start_steps[DR_AXES];          /* from a query a moment ago */
@@ -67,11 +74,8 @@ typedef struct {
     uint8_t angle_deg;                      /* TRIO */
     bool may_calibrate;                     /* a person allows it now */
     bool in_tissue;                         /* a person says so */
-    bool frame_lost;
-    bool interrupted;                       /* ^C broke off a move that the controller may resume: */
-    uint8_t old_drive;                      /*     of this drive */
-    uint32_t old_at_steps[DR_AXES];         /*     at rest here since */
-    dr_box old_target_q;                    /*     on its way to within here */
+    bool frame_lost;                        /* a calibration was broken off */
+    dr_old_move old[DR_PORTS];              /* by drive */
 } dr_scene;
 
 /* Where a motion may take the tip. */
