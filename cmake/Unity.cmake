@@ -12,5 +12,6 @@ endif()
 
 add_library(unity STATIC EXCLUDE_FROM_ALL "${UNITY_SOURCE_DIR}/unity.c")
 target_include_directories(unity SYSTEM PUBLIC "${UNITY_SOURCE_DIR}")
+target_compile_definitions(unity PUBLIC UNITY_INCLUDE_DOUBLE) # the host library has microns in double
 target_compile_options(unity PRIVATE -w) # not our code
 set_target_properties(unity PROPERTIES C_CLANG_TIDY "" EXPORT_COMPILE_COMMANDS OFF)
