@@ -402,7 +402,7 @@ static void begin_targeted(dr_controller *c, dr_us when, const dr_request *reque
     c->move_is_endless = endless;
 }
 
-static void begin_home(dr_controller *c, dr_us when, uint8_t op, bool answers)
+static void begin_home(dr_controller *c, dr_us when, uint8_t op)
 {
     const dr_drive *drive = active_drive(c);
     const bool calibrates = op == DR_OP_TRIO_RECALIBRATE || op == DR_OP_MPC_CALIBRATE;
@@ -414,17 +414,16 @@ static void begin_home(dr_controller *c, dr_us when, uint8_t op, bool answers)
     }
     if (!calibrates && !drive->y_moves_home)
         target[DR_Y] = drive->position_steps[DR_Y];
-    begin_move(c, when, op, DR_SPEED_FULL, target, answers);
+    begin_move(c, when, op, DR_SPEED_FULL, target, true);
 }
 
-static void begin_work(dr_controller *c, dr_us when, uint8_t op, bool answers)
+static void begin_work(dr_controller *c, dr_us when, uint8_t op)
 {
     const dr_drive *drive = active_drive(c);
     uint32_t target[DR_AXES];
     if (!drive->work_is_set || (op == DR_OP_MPC_WORK && !drive->at_home)) {
         note_value(c, when, drive->work_is_set ? DR_NOTE_NOT_AT_HOME : DR_NOTE_NO_WORK, op, 0);
-        if (answers)
-            answer_cr(c, when, op);
+        answer_cr(c, when, op);
         return;
     }
     copy_point(target, drive->work_steps);
@@ -432,16 +431,16 @@ static void begin_work(dr_controller *c, dr_us when, uint8_t op, bool answers)
     hold_axis(c, when, op, target);
     if (op == DR_OP_MPC_WORK && !drive->y_moves_home)
         target[DR_Y] = drive->position_steps[DR_Y];
-    begin_move(c, when, op, DR_SPEED_FULL, target, answers);
+    begin_move(c, when, op, DR_SPEED_FULL, target, true);
 }
 
-static void begin_centre(dr_controller *c, dr_us when, uint8_t op, bool answers)
+static void begin_centre(dr_controller *c, dr_us when, uint8_t op)
 {
     const dr_stage stage = active_stage(c);
     uint32_t target[DR_AXES];
     for (uint8_t axis = 0; axis < DR_AXES; axis++)
         target[axis] = stage.travel_steps[axis] / 2u;
-    begin_move(c, when, op, DR_SPEED_FULL, target, answers);
+    begin_move(c, when, op, DR_SPEED_FULL, target, true);
 }
 
 static void resume_move(dr_controller *c, dr_us when)
@@ -463,14 +462,14 @@ static void begin_motion(dr_controller *c, dr_us when, const dr_command *command
     case DR_OP_TRIO_RECALIBRATE:
     case DR_OP_MPC_HOME:
     case DR_OP_MPC_CALIBRATE:
-        begin_home(c, when, command->op, true);
+        begin_home(c, when, command->op);
         break;
     case DR_OP_TRIO_WORK:
     case DR_OP_MPC_WORK:
-        begin_work(c, when, command->op, true);
+        begin_work(c, when, command->op);
         break;
     case DR_OP_MPC_CENTRE:
-        begin_centre(c, when, command->op, true);
+        begin_centre(c, when, command->op);
         break;
     default:
         begin_targeted(c, when, request);
@@ -848,10 +847,10 @@ static void connect(dr_controller *c, dr_us now, const dr_hand *hand)
         for (uint8_t axis = 0; axis < DR_AXES; axis++)
             if (drive->position_steps[axis] > stage.travel_steps[axis])
                 drive->position_steps[axis] = stage.travel_steps[axis];
-    if (!is_connected(c, c->active)) {
+    if (in_use)
         c->move_is_paused = false;
+    if (!is_connected(c, c->active))
         activate_lowest(c);
-    }
     note_value(c, now, DR_NOTE_CONNECTED, DR_OP_NONE, hand->stage);
 }
 
@@ -872,6 +871,8 @@ bool dr_controller_poke(dr_controller *c, dr_us now, const dr_hand *hand)
     settle(c, now);
     switch (hand->what) {
     case DR_HAND_POWER_OFF:
+        if (c->state == DR_STATE_OFF)
+            return false;
         power_off(c, now);
         return true;
     case DR_HAND_POWER_ON:
@@ -914,6 +915,8 @@ static bool is_possible(const dr_controller *c, dr_effect effect, uint8_t value)
     if (c->state != DR_STATE_REST)
         return false;
     switch (effect) {
+    case DR_EFFECT_WORK:
+        return active_drive(c)->work_is_set && (trio || active_drive(c)->at_home);
     case DR_EFFECT_CALIBRATE:
         return !trio;
     case DR_EFFECT_SELECT:
@@ -941,35 +944,34 @@ static void stop_by_hand(dr_controller *c, dr_us now)
     }
 }
 
-static void begin_by_hand(dr_controller *c, dr_us now, dr_effect effect)
+/* What a host would ask for, but without a CR. */
+static void begin_by_hand(dr_controller *c, dr_us now, dr_op op)
 {
     dr_command command;
-    if (effect == DR_EFFECT_HOME)
-        begin_home(c, now, c->kind == DR_TRIO ? DR_OP_TRIO_HOME : DR_OP_MPC_HOME, false);
-    else if (effect == DR_EFFECT_WORK)
-        begin_work(c, now, c->kind == DR_TRIO ? DR_OP_TRIO_WORK : DR_OP_MPC_WORK, false);
-    else if (dr_command_for(kind_of(c), c->firmware, DR_OP_MPC_CENTRE, &command))
-        begin_centre(c, now, DR_OP_MPC_CENTRE, false);
-    else
-        begin_home(c, now, DR_OP_MPC_CALIBRATE, false);
+    if (!dr_command_for(kind_of(c), c->firmware, op, &command))
+        (void)dr_command_for(kind_of(c), c->firmware, DR_OP_MPC_CENTRE, &command); /* no calibration yet [M table 9, 'N'] */
+    c->move_is_paused = false; /* a move that ^C paused is dropped */
+    execute(c, now, &command, &command.code);
+    c->move_answers = false;
 }
 
 bool dr_controller_apply(dr_controller *c, dr_us now, dr_effect effect, uint8_t value)
 {
-    bool done = true;
-    dr_drive *drive;
     settle(c, now);
     if (!is_possible(c, effect, value))
         return false;
+    const bool trio = c->kind == DR_TRIO;
+    dr_drive *drive = active_drive(c);
     note_bytes(c, now, DR_NOTE_HAND, DR_OP_NONE, &value, 1, effect);
-    drive = active_drive(c);
     switch (effect) {
     case DR_EFFECT_HOME:
+        begin_by_hand(c, now, trio ? DR_OP_TRIO_HOME : DR_OP_MPC_HOME);
+        break;
     case DR_EFFECT_WORK:
+        begin_by_hand(c, now, trio ? DR_OP_TRIO_WORK : DR_OP_MPC_WORK);
+        break;
     case DR_EFFECT_CALIBRATE:
-        begin_by_hand(c, now, effect);
-        done = c->state == DR_STATE_MOVING;
-        c->move_is_paused = c->move_is_paused && !done;
+        begin_by_hand(c, now, DR_OP_MPC_CALIBRATE);
         break;
     case DR_EFFECT_PAUSE:
         c->leg_began = now - c->leg_began;
@@ -1002,7 +1004,7 @@ bool dr_controller_apply(dr_controller *c, dr_us now, dr_effect effect, uint8_t 
         break;
     }
     settle(c, now);
-    return done;
+    return true;
 }
 
 /* -- Setting up ------------------------------------------------------------------------------------------------------ */
