@@ -167,6 +167,64 @@ static void a_stranded_controller_listens_again_after_an_interrupt(void)
     expect_idle();
 }
 
+static void a_new_drive_knows_nothing_of_a_paused_move(void)
+{
+    for (unsigned unplugged_before = 0; unplugged_before < 2; unplugged_before++) {
+        prepare(DR_MPC);
+        rig.c.quirks = DR_QUIRK_PAUSE_ON_STOP;
+        start();
+        send_point('M', 0, 400000, 0);
+        sim_run(&rig, 1000);
+        send_code(3);
+        expect_cr(1000);
+        TEST_ASSERT_TRUE(!unplugged_before || plug(0, DR_STAGE_NONE));
+        TEST_ASSERT_TRUE(plug(0, DR_STAGE_MPC_MP865)); /* whose Y ends at 266,667 */
+        send_value('I', 1);
+        rig.seen = rig.count;
+        uint32_t at[DR_AXES];
+        dr_controller_position(&rig.c, 0, sim_clock(&rig), at);
+        send_point('M', 100, at[DR_Y], 0);
+        sim_run_out(&rig);
+        expect_cr(rig.now_us);
+        expect_at(0, 100, at[DR_Y], 0);
+        expect_idle();
+    }
+}
+
+static void a_smaller_drive_does_not_leave_its_travel(void)
+{
+    prepare(DR_MPC);
+    dr_drive_init(&rig.drives[0], DR_STAGE_MPC_MP865);
+    for (unsigned axis = 0; axis < DR_AXES; axis++) {
+        rig.drives[0].position_steps[axis] = axis == DR_X ? 1066667 : 0;
+        rig.drives[0].work_steps[axis] = axis == DR_X ? 1066667 : 0;
+    }
+    rig.drives[0].work_is_set = true;
+    start();
+    TEST_ASSERT_TRUE(plug(0, DR_STAGE_MPC_MP225));
+    uint32_t at[DR_AXES];
+    dr_controller_position(&rig.c, 0, sim_clock(&rig), at);
+    TEST_ASSERT_TRUE(at[DR_X] <= 400000);
+    send_code('H');
+    sim_run_out(&rig);
+    send_code('Y');
+    sim_run_out(&rig);
+    dr_controller_position(&rig.c, 0, sim_clock(&rig), at);
+    TEST_ASSERT_TRUE(at[DR_X] <= 400000);
+    rig.seen = rig.count;
+    expect_idle();
+
+    prepare(DR_TRIO);
+    dr_drive_init(&rig.drives[0], DR_STAGE_TRIO_MP845);
+    rig.c.home_steps[DR_Y] = 266667;
+    start();
+    TEST_ASSERT_TRUE(plug(0, DR_STAGE_TRIO_MP265)); /* Y ends at 100,000 */
+    send_code('h');
+    sim_run_out(&rig);
+    dr_controller_position(&rig.c, 0, sim_clock(&rig), at);
+    TEST_ASSERT_TRUE(at[DR_Y] <= 100000);
+}
+
 /* -- Notes ------------------------------------------------------------------------------------------------------------ */
 
 static void notes_tell_what_happened_in_order(void)
@@ -248,6 +306,8 @@ static void tests(void)
     RUN_TEST(an_empty_controller_wakes_up_with_its_first_drive);
     RUN_TEST(a_drive_that_is_unplugged_in_a_move_never_answers);
     RUN_TEST(a_stranded_controller_listens_again_after_an_interrupt);
+    RUN_TEST(a_new_drive_knows_nothing_of_a_paused_move);
+    RUN_TEST(a_smaller_drive_does_not_leave_its_travel);
     RUN_TEST(notes_tell_what_happened_in_order);
     RUN_TEST(a_full_ring_drops_the_oldest_and_counts);
     RUN_TEST(without_notes_all_is_the_same);

@@ -218,6 +218,16 @@ static void diagonals_are_those_of_table_2(void)
     TEST_ASSERT_EQUAL(10, DR_DIAGONAL_DEFAULT); /* switches 0,1,0,1: 29 degrees */
 }
 
+static void angles_of_the_trio_have_a_direction_each(void)
+{
+    for (uint8_t deg = 0; deg <= 90; deg++) {
+        const double radians = deg * acos(-1.0) / 180.0;
+        const dr_diagonal direction = dr_angle_get(deg);
+        TEST_ASSERT_EQUAL_UINT16(lround(32768.0 * cos(radians)), direction.cos);
+        TEST_ASSERT_EQUAL_UINT16(lround(32768.0 * sin(radians)), direction.sin);
+    }
+}
+
 /* -- Commands ------------------------------------------------------------------------------------------------------ */
 
 typedef struct {
@@ -387,6 +397,7 @@ int main(void)
     RUN_TEST(there_is_no_other_stage);
     RUN_TEST(stages_fit_by_controller_firmware_and_port);
     RUN_TEST(diagonals_are_those_of_table_2);
+    RUN_TEST(angles_of_the_trio_have_a_direction_each);
     RUN_TEST(every_byte_is_the_command_that_the_firmware_knows);
     RUN_TEST(every_operation_has_the_byte_that_a_host_sends);
     RUN_TEST(rows_come_in_turn_and_end);
