@@ -600,8 +600,9 @@ static void awake(dr_controller *c, dr_us when)
         begin_move(c, when, DR_OP_TRIO_RECALIBRATE, DR_SPEED_FULL, beginning, false);
 }
 
-/* One event that is due by now, the earliest. False: there is none. */
-static bool settle_one(dr_controller *c, dr_us now)
+/* One event that is due by now, the earliest. False: there is none. A kept command that need not wait for a reply to leave
+ * starts when the event before it was, not when somebody comes to see. */
+static bool settle_one(dr_controller *c, dr_us now, dr_us *before)
 {
     dr_us end;
     switch (c->state) {
@@ -610,6 +611,7 @@ static bool settle_one(dr_controller *c, dr_us now)
         if (dr_us_before(now, end))
             return false;
         awake(c, end);
+        *before = end;
         return true;
     case DR_STATE_MOVING:
         if (stream_newest(c, now))
@@ -618,11 +620,12 @@ static bool settle_one(dr_controller *c, dr_us now)
         if (dr_us_before(now, end))
             return false;
         end_leg(c, end);
+        *before = end;
         return true;
     case DR_STATE_REST:
         if (c->kept_bytes == 0 || dr_controller_ready(c) > 0)
             return false;
-        execute_kept(c, now);
+        execute_kept(c, *before);
         return true;
     default:
         return false;
@@ -631,7 +634,8 @@ static bool settle_one(dr_controller *c, dr_us now)
 
 static void settle(dr_controller *c, dr_us now)
 {
-    for (uint16_t i = 0; i < EVENTS_MAX && settle_one(c, now); i++) {
+    dr_us before = now;
+    for (uint16_t i = 0; i < EVENTS_MAX && settle_one(c, now, &before); i++) {
     }
 }
 

@@ -210,6 +210,22 @@ static void host_commands_during_a_hand_move_wait_for_its_end(void)
     TEST_ASSERT_EQUAL_UINT32(3 * LEG, b.got_at[0]);
 }
 
+static void a_command_that_waits_starts_when_the_hand_move_ends_whoever_comes_then(void)
+{
+    bench_begin(DR_TRIO);
+    bench_press(DR_BUTTON_HOME);
+    bench_release(DR_BUTTON_HOME);
+    bench_wait(100 * MS);
+    bench_host("x\xAB\x29\x00\x00", 5);      /* 10,667 */
+    b.clock += 3 * LEG - 100 * MS + LEG / 2; /* nobody comes when it ends */
+    bench_expect_at(5333, 0, 0);
+    b.clock += LEG - LEG / 2 - 1;
+    bench_wait(0);
+    bench_expect_nothing();
+    bench_wait(1);
+    bench_expect_bytes("\r", 1);
+}
+
 /* -- Holds ------------------------------------------------------------------------------------------------------------ */
 
 static void a_hold_acts_at_3_s_to_the_microsecond(void)
@@ -1020,6 +1036,7 @@ int main(void)
     RUN(work_pauses_a_hosts_w);
     RUN(home_and_work_leave_other_moves_alone);
     RUN(host_commands_during_a_hand_move_wait_for_its_end);
+    RUN(a_command_that_waits_starts_when_the_hand_move_ends_whoever_comes_then);
     RUN(a_hold_acts_at_3_s_to_the_microsecond);
     RUN(a_press_just_short_of_3_s_is_a_press);
     RUN(home_held_stores_home);
