@@ -199,21 +199,23 @@ static int exchange(dryrig *d, const dr_request *request, uint32_t quiet_us, ans
 
 static dr_op position_op(const dryrig *d) { return d->kind == DR_TRIO ? DR_OP_TRIO_POSITION : DR_OP_MPC_POSITION; }
 
-int stop_everything(dryrig *d, size_t most)
+int stop_everything(dryrig *d, size_t times)
 {
-    for (size_t i = 1; i <= most; i++) {
+    bool answered = false;
+    for (size_t i = 1; i <= times; i++) {
         uint8_t byte;
         int result = send_interrupt(d);
-        const uint64_t end_us = now_us(d) + (i < most ? PAUSE_US : d->answer_us);
-        for (uint64_t at_us; result >= 0 && (at_us = now_us(d)) < end_us;) {
+        /* All are sent, whatever comes back: a CR may as well be a coordinate of a position that is streamed. */
+        const uint64_t end_us = now_us(d) + (i < times ? PAUSE_US : d->answer_us);
+        for (uint64_t at_us; result >= 0 && !(answered && i == times) && (at_us = now_us(d)) < end_us;) {
             result = hear(d, &byte, 1, (uint32_t)(end_us - at_us));
-            if (result > 0 && byte == DR_CR)
-                return DRYRIG_OK;
+            answered = answered || (result > 0 && byte == DR_CR);
         }
         if (result < 0)
             return result;
     }
-    return fail(d, DRYRIG_ERR_CANNOT_STOP, "no answer to ^C within %u ms", (unsigned)(d->answer_us / MS_US));
+    return answered ? DRYRIG_OK
+                    : fail(d, DRYRIG_ERR_CANNOT_STOP, "no answer to ^C within %u ms", (unsigned)(d->answer_us / MS_US));
 }
 
 int resync(dryrig *d)

@@ -15,8 +15,8 @@
 #define AGAIN_US (100u * MS_US)       /* until the next look, while it does */
 #define SMALL_STEPS 16                /* MPC: moves below this on all axes may be ignored [P, small-move-silent] */
 #define SMALL_WAIT_US (300u * MS_US)
-#define STOPS_MAX 3 /* ^C is repeated where it is not answered */
-#define STOP_AGAIN_US (250u * MS_US)
+#define STOPS_MAX 3                 /* ^C is repeated where it is not answered */
+#define STOP_AGAIN_US (25u * MS_US) /* longer than USB adapters hold back the CR */
 #define TORN_US (200u * MS_US) /* silence that shows that a frame is torn: the slowest stream has 12 ms between two */
 #define WATCH_US (100u * MS_US)
 #define ARRIVED_STEPS 2 /* a motion that ended so near has arrived: the last step may be rounded */

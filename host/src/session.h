@@ -84,9 +84,9 @@ int ask(dryrig *d, dr_op op, answer *out);
 int settle(dryrig *d, uint32_t spacing_us, dryrig_position *out);
 /* Gets back in step. */
 int resync(dryrig *d);
-/* ^C until the controller answers, every 2 ms, `most` times at most. A command that lost bytes takes ^C for data; the next
- * ^C stops the motion that begins then. CANNOT_STOP: no answer. */
-int stop_everything(dryrig *d, size_t most);
+/* Sends ^C so many times, every 2 ms. A command that lost bytes takes ^C for data; the next ^C stops the motion that begins
+ * then. CANNOT_STOP: no CR came back. */
+int stop_everything(dryrig *d, size_t times);
 #define STOPS_THAT_END_ALL (DR_FRAME_MAX + 1u)
 /* MPC: makes sure that d->firmware is known, as far as the controller tells it. */
 int need_firmware(dryrig *d);

@@ -304,8 +304,8 @@ DRYRIG_API int dryrig_set_mode(dryrig *d, int mode);
 
 /* After TIMEOUT, GARBLED and other surprises late bytes may still come: a move's CR, the rest of an answer. The next function
  * then waits for silence and asks for the position until two answers in a row are exact before it does its own work. If a
- * motion that can be stopped has not answered, ^C comes first: every 2 ms until the controller answers, so that also a
- * command that lost bytes on its way ends, and what it began is stopped at once.
+ * motion that can be stopped has not answered, ^C comes first: fifteen, 2 ms apart, so that also a command that lost bytes
+ * on its way ends, and what it began is stopped at once.
  *
  * In one case a person must decide: a targeted TRIO motion other than the straight line has not answered. It may still run;
  * or the command lost a byte, and then the next byte sent completes it with a wild target that nothing can stop. Until
