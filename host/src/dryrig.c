@@ -105,7 +105,10 @@ static int set_up(dryrig *d, const dryrig_options *options)
     d->firmware = d->kind == DR_TRIO ? DR_FIRMWARE_TRIO : DR_FIRMWARE_MPC;
     d->firmware_is_known = d->kind == DR_TRIO;
     if (options->firmware != 0) {
-        if (options->firmware < DR_FIRMWARE_FIRST || options->firmware > DR_FIRMWARE_LAST)
+        bool is_version = options->firmware >= DR_FIRMWARE_FIRST && options->firmware <= DR_FIRMWARE_LAST;
+        for (unsigned digits = options->firmware; digits != 0; digits >>= 4u)
+            is_version = is_version && (digits & 0xFu) <= 9u;
+        if (!is_version)
             return fail(d, DRYRIG_ERR_ARGUMENT, "options.firmware is 0x%X, which is no version: 0x0321 is 3.21",
                         options->firmware);
         d->firmware = (uint16_t)options->firmware;

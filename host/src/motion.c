@@ -374,29 +374,27 @@ static int take_target(dryrig *d, const wish *want, dr_stage_id stage, plan *p)
     return result;
 }
 
-/* What can be refused before the controller is asked anything: with the stage, if all drives have the same, or with any. */
+/* What can be refused before the controller is asked anything: what no drive that may be the active one can do. */
 static int refuse_early(dryrig *d, const wish *want)
 {
-    plan unused;
-    dr_stage_id stage = stage_of(d, d->kind == DR_TRIO ? 0 : d->drive != 0 ? d->drive : 1);
-    for (int drive = 1; d->kind == DR_MPC && d->drive == 0 && drive <= DRYRIG_DRIVES; drive++)
-        stage = stage_of(d, drive) == stage ? stage : DR_STAGE_NONE;
     if (want->level < 0 || want->level >= DRYRIG_SPEEDS)
         return fail(d, DRYRIG_ERR_RANGE, "speed level %d: there are 0 (slowest) to 15", want->level);
     if (want->stream && d->kind == DR_TRIO)
         return fail(d, DRYRIG_ERR_UNSUPPORTED, "a TRIO streams no positions");
-    for (size_t axis = 0; want->um != NULL && axis < DR_AXES; axis++)
-        if (want->um[axis] < 0 && (want->axis == DR_AXES || want->axis == axis))
-            return fail(d, DRYRIG_ERR_RANGE, "%c: %.10g um is negative; travel begins at 0", "XYZ"[axis],
-                        want -> um[axis]);
-    if (want->um != NULL && stage == DR_STAGE_NONE && d->drive == 0 && d->kind == DR_MPC) {
-        bool some = false;
-        for (int drive = 1; drive <= DRYRIG_DRIVES; drive++)
-            some = some || stage_of(d, drive) != DR_STAGE_NONE;
-        if (some)
-            return DRYRIG_OK; /* the active drive's may be among them */
+    if (want->um == NULL && want->steps == NULL)
+        return DRYRIG_OK;
+    const bool any = d->kind == DR_MPC && d->drive == 0;
+    int result = DRYRIG_OK;
+    for (int drive = any ? 1 : d->drive; drive <= (any ? DRYRIG_DRIVES : d->drive); drive++) {
+        plan unused;
+        const dr_stage_id stage = stage_of(d, drive);
+        if (any && want->um != NULL && stage == DR_STAGE_NONE && (result < 0 || drive < DRYRIG_DRIVES))
+            continue; /* the others' stages may be known */
+        result = take_target(d, want, stage, &unused);
+        if (result == DRYRIG_OK)
+            break;
     }
-    return want->um != NULL || want->steps != NULL ? take_target(d, want, stage, &unused) : DRYRIG_OK;
+    return result;
 }
 
 static int was_interrupted(dryrig *d)
