@@ -76,7 +76,9 @@ bool dr_segment_touches_half(const dr_segment *way, const dr_half *half)
 /* -- A segment and a box -------------------------------------------------------------------------------------------- */
 
 /* A part of the way, 0 at its start and 1 at its end: numerator and positive denominator. */
-typedef struct { int64_t over, under; } share;
+typedef struct {
+    int64_t over, under;
+} share;
 
 static bool is_less(share a, share b) { return a.over * b.under < b.over * a.under; }
 

@@ -12,13 +12,20 @@
 extern "C" {
 #endif
 
-#define DR_FAR_Q INT32_C(16777216)  /* 2^24 quanta = 262 mm: more than twice the longest travel */
-#define DR_NORMAL_MAX 1024          /* the largest component of a direction */
+#define DR_FAR_Q INT32_C(16777216) /* 2^24 quanta = 262 mm: more than twice the longest travel */
+#define DR_NORMAL_MAX 1024         /* the largest component of a direction */
 
-typedef struct { int32_t min_q[DR_AXES], max_q[DR_AXES]; } dr_box;
-typedef struct { int32_t from_q[DR_AXES], to_q[DR_AXES]; } dr_segment;
+typedef struct {
+    int32_t min_q[DR_AXES], max_q[DR_AXES];
+} dr_box;
+typedef struct {
+    int32_t from_q[DR_AXES], to_q[DR_AXES];
+} dr_segment;
 /* All points p with normal . p <= offset: the normal points out of it, to where the tip may be. */
-typedef struct { int64_t offset_q; int16_t normal[DR_AXES]; } dr_half;
+typedef struct {
+    int64_t offset_q;
+    int16_t normal[DR_AXES];
+} dr_half;
 
 /* The smallest box around a segment: what a move between its ends cannot leave, if no axis ever turns back. */
 dr_box dr_box_around(const dr_segment *way);

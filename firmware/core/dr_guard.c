@@ -9,57 +9,57 @@ typedef enum { MODE_LOCKED, MODE_DISARMED, MODE_ARMED, MODE_FAULT, MODE_STOPPED 
 /* What is under way on the controller's side. One thing at a time. */
 typedef enum {
     TASK_NONE,
-    TASK_PROVE,      /* is it the controller of the limits? READ or, between two tries, DR_TIMER_TASK runs */
-    TASK_ARM,        /* two readings that must agree */
-    TASK_PASS,       /* the host's query, setting or idle ^C: its reply goes through byte by byte */
-    TASK_RECHECK,    /* the host's query got nonsense: a reading of the guard's own decides */
-    TASK_CHECK,      /* a motion waits for a reading */
-    TASK_SEND,       /* a motion was allowed and waits for its turn, or is leaving */
-    TASK_MOVE,       /* its CR is awaited */
-    TASK_VERIFY,     /* the CR is there and kept back: is the tip where it should be? */
-    TASK_STOP        /* ^C was sent: quiet, then two readings that agree prove rest */
+    TASK_PROVE,   /* is it the controller of the limits? READ or, between two tries, DR_TIMER_TASK runs */
+    TASK_ARM,     /* two readings that must agree */
+    TASK_PASS,    /* the host's query, setting or idle ^C: its reply goes through byte by byte */
+    TASK_RECHECK, /* the host's query got nonsense: a reading of the guard's own decides */
+    TASK_CHECK,   /* a motion waits for a reading */
+    TASK_SEND,    /* a motion was allowed and waits for its turn, or is leaving */
+    TASK_MOVE,    /* its CR is awaited */
+    TASK_VERIFY,  /* the CR is there and kept back: is the tip where it should be? */
+    TASK_STOP     /* ^C was sent: quiet, then two readings that agree prove rest */
 } dr_task;
 
 typedef enum {
     READ_OFF,
-    READ_WAITS,      /* for DR_TIMER_READ: the gap between frames */
-    READ_SENT,       /* DR_TIMER_READ is its deadline */
-    READ_QUIETS      /* after nonsense: 100 ms without a byte, then once more */
+    READ_WAITS, /* for DR_TIMER_READ: the gap between frames */
+    READ_SENT,  /* DR_TIMER_READ is its deadline */
+    READ_QUIETS /* after nonsense: 100 ms without a byte, then once more */
 } dr_read_phase;
 
-#define MS(ms) ((dr_us)(ms) * 1000u)
-#define FRAME_GAP_US MS(2)             /* between two frames to the controller */
-#define LINE_PAUSE_US MS(35)           /* within the 'S' of an MPC-200: 30 ms [M note 10], and some */
-#define LINE_HEAD 2u                   /* bytes before that pause: 'S' and the speed */
-#define BYTE_TIMEOUT_US MS(100)        /* longest gap of real hosts: 35 ms and a USB converter's 16 ms */
+#define MS(ms) ((dr_us)(ms)*1000u)
+#define FRAME_GAP_US MS(2)      /* between two frames to the controller */
+#define LINE_PAUSE_US MS(35)    /* within the 'S' of an MPC-200: 30 ms [M note 10], and some */
+#define LINE_HEAD 2u            /* bytes before that pause: 'S' and the speed */
+#define BYTE_TIMEOUT_US MS(100) /* longest gap of real hosts: 35 ms and a USB converter's 16 ms */
 #define FRAME_TIMEOUT_US MS(300)
 #define RESYNC_US MS(50)
 #define REPLY_TIMEOUT_US MS(2000)
-#define REPLY_GAP_US MS(100)           /* between two bytes of one reply */
+#define REPLY_GAP_US MS(100) /* between two bytes of one reply */
 #define QUIET_US MS(100)
-#define REST_APART_US MS(100)          /* between two readings that must agree */
+#define REST_APART_US MS(100) /* between two readings that must agree */
 #define PROOF_OF_REST_US MS(1000)
-#define PROOF_RETRY_US MS(500)         /* once that has failed */
+#define PROOF_RETRY_US MS(500) /* once that has failed */
 #define REPEAT_STOP_US MS(150)
 #define STOPS_MAX 3u
-#define SMALL_MOVE_US MS(100)          /* 15 microsteps at the slowest speed take 15 ms */
-#define SMALL_MOVE_STEPS 16u           /* an MPC-200 ignores shorter moves, without a CR ([P], small-move-silent) */
+#define SMALL_MOVE_US MS(100) /* 15 microsteps at the slowest speed take 15 ms */
+#define SMALL_MOVE_STEPS 16u  /* an MPC-200 ignores shorter moves, without a CR ([P], small-move-silent) */
 #define CALIBRATION_US MS(60000)
-#define MOVE_LONGEST_US MS(2000000)    /* instants are told apart up to 35 minutes */
-#define STALE_US MS(20000)             /* the longest travel, by knob */
+#define MOVE_LONGEST_US MS(2000000) /* instants are told apart up to 35 minutes */
+#define STALE_US MS(20000)          /* the longest travel, by knob */
 #define JUMP_Q (20 * (int32_t)DR_QUANTA_PER_UM)
-#define READY_US MS(1000)              /* "ready about one second after power-on" [O] */
+#define READY_US MS(1000) /* "ready about one second after power-on" [O] */
 #define PROVE_RETRY_US MS(1000)
-#define PROVE_ATTEMPTS 60u             /* a TRIO may be calibrating by itself */
+#define PROVE_ATTEMPTS 60u /* a TRIO may be calibrating by itself */
 #define RATE_TOKENS 20u
 #define RATE_US MS(50)
 #define NOISE_US MS(1000)
 #define NOISE_MAX 16u
 #define WIRING_US MS(50)
 #define RELEASE_US MS(20)
-#define RAW_STOPS_MAX 15u              /* ^C that wait to leave */
+#define RAW_STOPS_MAX 15u /* ^C that wait to leave */
 #define CTRL_C 0x03u
-#define EVENTS_MAX 256u                /* that can be due at once, when nobody called for long */
+#define EVENTS_MAX 256u /* that can be due at once, when nobody called for long */
 
 /* -- Small helpers ------------------------------------------------------------------------------------------------- */
 
@@ -150,7 +150,8 @@ static dr_record record_of(const dr_guard *g, dr_us now, dr_event event, uint8_t
     return record;
 }
 
-static void log_bytes(dr_guard *g, dr_us now, dr_event event, uint8_t code, uint8_t op, const uint8_t *bytes, uint8_t count)
+static void log_bytes(dr_guard *g, dr_us now, dr_event event, uint8_t code, uint8_t op, const uint8_t *bytes,
+                      uint8_t count)
 {
     dr_record record = record_of(g, now, event, code);
     record.op = op;
@@ -224,8 +225,8 @@ static void refuse(dr_guard *g, dr_us now, const dr_command *command, const uint
     g->refused++;
     g->last_op = command->op;
     g->last_refusal = verdict;
-    if ((command->is & DR_IS_MOTION) != 0 && verdict.reason != DR_REASON_BUSY && verdict.reason != DR_REASON_CANCELLED &&
-        g->limits->refusal == DR_REFUSE_E)
+    if ((command->is & DR_IS_MOTION) != 0 && verdict.reason != DR_REASON_BUSY &&
+        verdict.reason != DR_REASON_CANCELLED && g->limits->refusal == DR_REFUSE_E)
         put_host(g, DR_NO_SUCH_DRIVE);
 }
 
@@ -503,7 +504,8 @@ static bool has_jumped(const dr_guard *g, dr_us now, const dr_reply *reply)
         return false;
     const uint64_t knob_q = locked ? 0 : (uint64_t)g->limits->knob_q_per_s * (now - g->position_at) / DR_US_PER_S;
     for (uint8_t axis = 0; axis < DR_AXES; axis++)
-        if ((uint64_t)apart(reply->steps[axis], g->scene.start_steps[axis]) * stage.quanta_per_step > knob_q + (uint64_t)JUMP_Q)
+        if ((uint64_t)apart(reply->steps[axis], g->scene.start_steps[axis]) * stage.quanta_per_step >
+            knob_q + (uint64_t)JUMP_Q)
             return true;
     return false;
 }
@@ -648,7 +650,8 @@ static bool is_at_an_end(const dr_guard *g, const dr_reply *reply)
     const dr_box start = dr_box_around(&stays);
     const bool homes = g->command.op == DR_OP_TRIO_HOME || g->command.op == DR_OP_TRIO_HOME_TO;
     return is_at(g, reply, &g->path.target_q) ||
-           (homes && has_rig(g, DR_RIG_Y_LOCKED_OUT) && is_at(g, reply, &without_y)) || (g->small && is_at(g, reply, &start));
+           (homes && has_rig(g, DR_RIG_Y_LOCKED_OUT) && is_at(g, reply, &without_y)) ||
+           (g->small && is_at(g, reply, &start));
 }
 
 static void read_for_end(dr_guard *g, dr_us now, const dr_reply *reply)
@@ -1484,8 +1487,8 @@ void dr_guard_get_status(const dr_guard *g, dr_guard_status *out)
 {
     *out = (dr_guard_status){.state = (uint8_t)state_of(g), .fault = g->fault, .needs = needs_of(g)};
     if (g->limits != NULL) {
-        const bool outside = g->position_known && dr_judge_place(g->limits, g->scene.drive, g->scene.start_steps).reason !=
-                                                      DR_REASON_NONE;
+        const bool outside = g->position_known &&
+                             dr_judge_place(g->limits, g->scene.drive, g->scene.start_steps).reason != DR_REASON_NONE;
         if (outside && !is_on(g, DR_INPUT_ESCAPE))
             out->needs |= DR_NEEDS_INSIDE;
         if (g->unsteady)

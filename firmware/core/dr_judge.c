@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define MODE_LAST 9u                /* [M table 9, 'L'] */
+#define MODE_LAST 9u /* [M table 9, 'L'] */
 #define LAST_LEVEL (DR_SPEED_LEVELS - 1u)
 
 /* From the answer to the query until the motion begins, a knob may move the tip: the gap on the wire and the frame, and on
@@ -19,7 +19,10 @@ static dr_verdict refuse(dr_reason reason, uint8_t axis, int64_t measured, int64
     return (dr_verdict){(uint8_t)reason, axis, DR_NO_ITEM, measured, limit};
 }
 
-static dr_verdict refuse_item(dr_reason reason, uint8_t item) { return (dr_verdict){(uint8_t)reason, DR_AXES, item, 0, 0}; }
+static dr_verdict refuse_item(dr_reason reason, uint8_t item)
+{
+    return (dr_verdict){(uint8_t)reason, DR_AXES, item, 0, 0};
+}
 
 static bool has(const dr_limits *l, uint16_t rig) { return (l->rig & rig) != 0; }
 static bool is_line(uint8_t op) { return op == DR_OP_TRIO_LINE || op == DR_OP_MPC_LINE; }
@@ -122,8 +125,9 @@ static dr_box calibration_of(const dr_limits *l, const dr_stage *stage, const in
 {
     dr_box box;
     for (uint8_t axis = 0; axis < DR_AXES; axis++) {
-        const int32_t end_q = op == DR_OP_TRIO_RECALIBRATE ? DR_CALIBRATED_TO_Q
-                                                           : (int32_t)(stage->travel_steps[axis] * stage->quanta_per_step / 2u);
+        const int32_t end_q = op == DR_OP_TRIO_RECALIBRATE
+                                  ? DR_CALIBRATED_TO_Q
+                                  : (int32_t)(stage->travel_steps[axis] * stage->quanta_per_step / 2u);
         box.min_q[axis] = -l->beyond_zero_q;
         box.max_q[axis] = start_q[axis] > end_q ? start_q[axis] : end_q;
     }
@@ -236,7 +240,8 @@ static bool path_hits(const dr_path *path, const dr_obstacle *o, int32_t margin_
     return false;
 }
 
-static dr_verdict judge_box_clear(const dr_limits *l, uint8_t drive, const dr_box *box, int32_t margin_q, dr_reason reason)
+static dr_verdict judge_box_clear(const dr_limits *l, uint8_t drive, const dr_box *box, int32_t margin_q,
+                                  dr_reason reason)
 {
     for (uint8_t item = 0; item < l->obstacle_count; item++)
         if (l->obstacles[item].drive == drive && box_hits(box, &l->obstacles[item], margin_q))
@@ -427,9 +432,8 @@ static dr_verdict judge_surface(const dr_limits *l, const dr_scene *scene, const
         return allowed;
     if (scene->in_tissue)
         return refuse(DR_REASON_APPROACH, DR_AXES, 0, 0);
-    return height <= (int64_t)d->clearance_q
-               ? refuse(DR_REASON_LATERAL, dr_to_axis(d->retract), height, d->clearance_q)
-               : allowed;
+    return height <= (int64_t)d->clearance_q ? refuse(DR_REASON_LATERAL, dr_to_axis(d->retract), height, d->clearance_q)
+                                             : allowed;
 }
 
 /* What ^C broke off, on any drive, may be resumed by the next motion: that way must be clear too. */
@@ -471,7 +475,8 @@ static dr_verdict judge_where(const dr_limits *l, const dr_scene *scene, const d
     return refuse(DR_REASON_HIDDEN, way.axis, way.measured, way.limit);
 }
 
-dr_verdict dr_judge_motion(const dr_limits *l, const dr_scene *scene, const dr_command *command, const dr_request *request)
+dr_verdict dr_judge_motion(const dr_limits *l, const dr_scene *scene, const dr_command *command,
+                           const dr_request *request)
 {
     if (scene->drive != scene->chosen || l->drives[scene->drive].stage == DR_STAGE_NONE)
         return refuse(DR_REASON_DRIVE, DR_AXES, scene->drive + 1, scene->chosen + 1);

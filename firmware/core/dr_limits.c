@@ -22,30 +22,37 @@ uint32_t dr_crc32c(uint32_t crc, const uint8_t *bytes, size_t count)
 /* -- The layout of the image, written once ------------------------------------------------------------------------------ */
 
 /* Offset in the struct, bytes of one value, how many values running. */
-typedef struct { uint8_t offset, size, count; } field;
+typedef struct {
+    uint8_t offset, size, count;
+} field;
 
-#define VALUE(type, name) {offsetof(type, name), sizeof(((type *)0)->name), 1}
-#define VALUES(type, name) \
-    {offsetof(type, name), sizeof(((type *)0)->name[0]), sizeof(((type *)0)->name) / sizeof(((type *)0)->name[0])}
+#define VALUE(type, name)                                                                                              \
+    {                                                                                                                  \
+        offsetof(type, name), sizeof(((type *)0)->name), 1                                                             \
+    }
+#define VALUES(type, name)                                                                                             \
+    {                                                                                                                  \
+        offsetof(type, name), sizeof(((type *)0)->name[0]), sizeof(((type *)0)->name) / sizeof(((type *)0)->name[0])   \
+    }
 #define FIELDS(table) (sizeof(table) / sizeof(table)[0])
 
 static const field head_fields[] = {
-    VALUE(dr_limits, kind),           VALUE(dr_limits, obstacle_count), VALUE(dr_limits, refusal),
-    VALUE(dr_limits, host_loss),      VALUE(dr_limits, firmware),       VALUE(dr_limits, rig),
-    VALUE(dr_limits, revision),       VALUES(dr_limits, serial),        VALUE(dr_limits, angle_min_deg),
-    VALUE(dr_limits, angle_max_deg),  VALUE(dr_limits, mode_min),       VALUE(dr_limits, unstoppable_ms),
-    VALUE(dr_limits, arm_idle_s),     VALUE(dr_limits, margin_q),       VALUE(dr_limits, knob_q_per_s),
+    VALUE(dr_limits, kind),          VALUE(dr_limits, obstacle_count), VALUE(dr_limits, refusal),
+    VALUE(dr_limits, host_loss),     VALUE(dr_limits, firmware),       VALUE(dr_limits, rig),
+    VALUE(dr_limits, revision),      VALUES(dr_limits, serial),        VALUE(dr_limits, angle_min_deg),
+    VALUE(dr_limits, angle_max_deg), VALUE(dr_limits, mode_min),       VALUE(dr_limits, unstoppable_ms),
+    VALUE(dr_limits, arm_idle_s),    VALUE(dr_limits, margin_q),       VALUE(dr_limits, knob_q_per_s),
     VALUE(dr_limits, beyond_zero_q),
 };
 static const field drive_fields[] = {
-    VALUE(dr_drive_limits, stage),       VALUE(dr_drive_limits, fast_level),    VALUE(dr_drive_limits, slow_level),
-    VALUE(dr_drive_limits, retract),     VALUES(dr_drive_limits, box_q.min_q),  VALUES(dr_drive_limits, box_q.max_q),
-    VALUE(dr_drive_limits, max_move_q),  VALUE(dr_drive_limits, surface_q),     VALUE(dr_drive_limits, clearance_q),
+    VALUE(dr_drive_limits, stage),      VALUE(dr_drive_limits, fast_level),   VALUE(dr_drive_limits, slow_level),
+    VALUE(dr_drive_limits, retract),    VALUES(dr_drive_limits, box_q.min_q), VALUES(dr_drive_limits, box_q.max_q),
+    VALUE(dr_drive_limits, max_move_q), VALUE(dr_drive_limits, surface_q),    VALUE(dr_drive_limits, clearance_q),
     VALUES(dr_drive_limits, approach),
 };
 static const field obstacle_fields[] = {
-    VALUE(dr_obstacle, shape),            VALUE(dr_obstacle, drive),           VALUE(dr_obstacle, exit),
-    VALUES(dr_obstacle, box_q.min_q),     VALUES(dr_obstacle, box_q.max_q),    VALUE(dr_obstacle, half_q.offset_q),
+    VALUE(dr_obstacle, shape),          VALUE(dr_obstacle, drive),        VALUE(dr_obstacle, exit),
+    VALUES(dr_obstacle, box_q.min_q),   VALUES(dr_obstacle, box_q.max_q), VALUE(dr_obstacle, half_q.offset_q),
     VALUES(dr_obstacle, half_q.normal),
 };
 
@@ -96,7 +103,11 @@ static void store(uint8_t *to, uint8_t size, uint64_t value)
 }
 
 /* Where bytes of the image go to: a buffer, or only into the CRC. */
-typedef struct { uint8_t *image; size_t at; uint32_t crc; } sink;
+typedef struct {
+    uint8_t *image;
+    size_t at;
+    uint32_t crc;
+} sink;
 
 static void put_byte(sink *to, uint8_t byte)
 {
@@ -139,7 +150,8 @@ static uint32_t put_all(const dr_limits *limits, uint8_t *image)
     for (uint8_t i = 0; i < DR_PORTS; i++)
         put_struct(&to, drive_fields, FIELDS(drive_fields), &limits->drives[i]);
     for (uint8_t i = 0; i < DR_OBSTACLES_MAX; i++)
-        put_struct(&to, obstacle_fields, FIELDS(obstacle_fields), i < limits->obstacle_count ? &limits->obstacles[i] : &none);
+        put_struct(&to, obstacle_fields, FIELDS(obstacle_fields),
+                   i < limits->obstacle_count ? &limits->obstacles[i] : &none);
     return to.crc;
 }
 

@@ -15,23 +15,23 @@ extern "C" {
 #define DR_RECORD_BYTES 48u
 
 typedef struct {
-    uint32_t sequence;                      /* from 0 at start */
+    uint32_t sequence; /* from 0 at start */
     dr_us when;
-    uint8_t event;                          /* dr_event of dr_guard.h */
-    uint8_t before, after;                  /* dr_guard_state */
-    uint8_t code, axis, item;               /* see the event */
-    uint8_t op;                             /* dr_op that it is about */
-    uint8_t count;                          /* of bytes; stops at 255; DR_RECORD_TEXT of them are kept */
+    uint8_t event;            /* dr_event of dr_guard.h */
+    uint8_t before, after;    /* dr_guard_state */
+    uint8_t code, axis, item; /* see the event */
+    uint8_t op;               /* dr_op that it is about */
+    uint8_t count;            /* of bytes; stops at 255; DR_RECORD_TEXT of them are kept */
     uint8_t bytes[DR_RECORD_TEXT];
     uint32_t position_steps[DR_AXES];
-    uint32_t crc;                           /* CRC-32C of the record before, chained over all of this but crc */
+    uint32_t crc; /* CRC-32C of the record before, chained over all of this but crc */
 } dr_record;
 
 typedef struct {
     dr_record *ring;
     uint16_t size, first, count;
-    uint32_t missed;                        /* overwritten unread */
-    uint32_t sequence, crc;                 /* of the next; of the last */
+    uint32_t missed;        /* overwritten unread */
+    uint32_t sequence, crc; /* of the next; of the last */
 } dr_log;
 
 /* ring NULL or size 0: keeps nothing. */

@@ -85,9 +85,10 @@ static void monitor_wire(uint8_t byte, uint8_t state_before)
     TEST_ASSERT_TRUE_MESSAGE(framed == DR_FRAMED_PART || framed == DR_FRAMED_WHOLE, "M1: no frame begins so");
     if (framed == DR_FRAMED_PART)
         return;
-    const bool own = command.op == DR_OP_TRIO_POSITION || command.op == DR_OP_MPC_POSITION ||
-                     (command.is & DR_IS_INTERRUPT) != 0;
-    TEST_ASSERT_TRUE_MESSAGE(own || host_has_sent(rig.framer.bytes, 1u + command.args), "M1: not a frame of the host's");
+    const bool own =
+        command.op == DR_OP_TRIO_POSITION || command.op == DR_OP_MPC_POSITION || (command.is & DR_IS_INTERRUPT) != 0;
+    TEST_ASSERT_TRUE_MESSAGE(own || host_has_sent(rig.framer.bytes, 1u + command.args),
+                             "M1: not a frame of the host's");
     if ((command.is & DR_IS_MOTION) != 0)
         TEST_ASSERT_EQUAL_MESSAGE(DR_GUARD_CHECKING, rig.frame_state, "M2: a motion left in this state");
 }
@@ -127,7 +128,8 @@ static void from_guard_to_host(void)
     uint8_t byte;
     while (dr_guard_pull_host(&rig.guard, clock_now(), &byte, 1) == 1) {
         if (rig.refused_open)
-            TEST_ASSERT_TRUE_MESSAGE(byte == 'E' && rig.limits.refusal == DR_REFUSE_E, "M5: a refused motion was answered");
+            TEST_ASSERT_TRUE_MESSAGE(byte == 'E' && rig.limits.refusal == DR_REFUSE_E,
+                                     "M5: a refused motion was answered");
         TEST_ASSERT_TRUE(rig.heard_count < HEARD_MAX);
         rig.heard[rig.heard_count++] = byte;
     }
@@ -296,8 +298,8 @@ void bench_armed_mpc(void)
 uint8_t keep_out(int32_t x0, int32_t x1, int32_t y0, int32_t y1, int32_t z0, int32_t z1)
 {
     const uint8_t item = rig.limits.obstacle_count++;
-    rig.limits.obstacles[item] =
-        (dr_obstacle){DR_SHAPE_BOX, 0, DR_TO_NONE, {{UM(x0), UM(y0), UM(z0)}, {UM(x1), UM(y1), UM(z1)}}, {0, {0, 0, 0}}};
+    rig.limits.obstacles[item] = (dr_obstacle){
+        DR_SHAPE_BOX, 0, DR_TO_NONE, {{UM(x0), UM(y0), UM(z0)}, {UM(x1), UM(y1), UM(z1)}}, {0, {0, 0, 0}}};
     return item;
 }
 
@@ -308,12 +310,14 @@ void host_bytes(const void *bytes, size_t count)
     const uint8_t *byte = bytes;
     TEST_ASSERT_TRUE(rig.sent_count + count <= WIRE_MAX);
     for (size_t i = 0; i < count; i++) {
-        const bool moving = status().state == DR_GUARD_MOVING_S, leaving = rig.guard.out_at > 0 && rig.guard.out_at < rig.guard.out_count;
+        const bool moving = status().state == DR_GUARD_MOVING_S,
+                   leaving = rig.guard.out_at > 0 && rig.guard.out_at < rig.guard.out_count;
         const uint32_t stops = rig.guard.stops_out, sent = wire_stops();
         rig.sent[rig.sent_count++] = byte[i];
         dr_guard_push_host(&rig.guard, clock_now(), byte + i, 1);
         if (moving && byte[i] == 0x03) /* M6: it waits for nothing but a byte, or a frame, that is on the wire */
-            TEST_ASSERT_TRUE_MESSAGE(rig.guard.stops_out > stops || leaving || wire_stops() > sent, "M6: ^C did not leave at once");
+            TEST_ASSERT_TRUE_MESSAGE(rig.guard.stops_out > stops || leaving || wire_stops() > sent,
+                                     "M6: ^C did not leave at once");
         settle_world();
     }
 }
@@ -375,7 +379,8 @@ void host_line(unsigned level, uint32_t x, uint32_t y, uint32_t z)
 
 void input(dr_input what, bool on)
 {
-    const bool moving = status().state == DR_GUARD_MOVING_S, stop = on && (what == DR_INPUT_STOP || what == DR_INPUT_STOP_2);
+    const bool moving = status().state == DR_GUARD_MOVING_S,
+               stop = on && (what == DR_INPUT_STOP || what == DR_INPUT_STOP_2);
     const uint32_t stops = rig.guard.stops_out, sent = wire_stops();
     rig.person = true;
     if (what == DR_INPUT_ARM && on)

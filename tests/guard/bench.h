@@ -16,7 +16,7 @@
 #include "dr_guard.h"
 #include "unity.h"
 
-#define UM(um) ((int32_t)((um) * 64))
+#define UM(um) ((int32_t)((um)*64))
 #define HEARD_MAX 4096u
 #define WIRE_MAX 65536u
 
@@ -27,17 +27,17 @@ struct bench {
     dr_record ring[64];
     dr_controller controller;
     dr_drive drives[DR_PORTS];
-    uint64_t now;                    /* us */
-    uint32_t clock_at_start;         /* what the guard's clock showed then */
+    uint64_t now;            /* us */
+    uint32_t clock_at_start; /* what the guard's clock showed then */
     uint32_t byte_us;
 
-    bool by_hand;                    /* the test is the controller: device_says(), wire[] */
+    bool by_hand;                         /* the test is the controller: device_says(), wire[] */
     int (*spoil)(bench *b, uint8_t byte); /* what arrives instead of a byte that the controller sends; -1: nothing */
-    uint32_t said;                   /* bytes that the controller has sent so far */
+    uint32_t said;                        /* bytes that the controller has sent so far */
 
-    uint8_t heard[HEARD_MAX];        /* by the host */
+    uint8_t heard[HEARD_MAX]; /* by the host */
     uint32_t heard_count, heard_taken;
-    uint8_t wire[WIRE_MAX];          /* what the guard sent to the controller */
+    uint8_t wire[WIRE_MAX]; /* what the guard sent to the controller */
     uint64_t wire_at[WIRE_MAX];
     uint32_t wire_count, wire_taken;
 
@@ -47,20 +47,20 @@ struct bench {
     uint64_t to_device_at, to_guard_at;
     uint64_t device_heard_at;
 
-    dr_record log[512];              /* the newest records */
+    dr_record log[512]; /* the newest records */
     uint32_t log_count;
     uint32_t crc;
-    uint32_t frames_refused;         /* M4: records of it */
+    uint32_t frames_refused; /* M4: records of it */
 
-    uint8_t sent[WIRE_MAX];          /* by the host, M1 */
+    uint8_t sent[WIRE_MAX]; /* by the host, M1 */
     uint32_t sent_count;
-    dr_framer framer;                /* of the controller's bytes, M1 */
-    uint8_t frame_state;             /* M2: the guard's state before the frame's first byte */
-    bool refused_open;               /* M5 */
-    bool watch_tip;                  /* M3 */
+    dr_framer framer;    /* of the controller's bytes, M1 */
+    uint8_t frame_state; /* M2: the guard's state before the frame's first byte */
+    bool refused_open;   /* M5 */
+    bool watch_tip;      /* M3 */
     uint64_t tip_checked;
-    uint8_t state;                   /* M7 */
-    bool person;                     /* an input was given since the state was looked at last */
+    uint8_t state; /* M7 */
+    bool person;   /* an input was given since the state was looked at last */
     uint64_t arm_pressed;
 };
 
@@ -73,7 +73,7 @@ void bench_trio(void);
 void bench_mpc(void);
 /* Starts both, links up, waits for the proof of identity. */
 void bench_start(void);
-void bench_arm(void);                /* key and ARM: IDLE afterwards */
+void bench_arm(void); /* key and ARM: IDLE afterwards */
 void bench_armed_trio(void);
 void bench_armed_mpc(void);
 /* Adds an obstacle to the limits of drive 0: um. */
@@ -93,8 +93,8 @@ size_t put_line_frame(uint8_t *frame, unsigned level, uint32_t x, uint32_t y, ui
 size_t put_point_frame(uint8_t *frame, int code, uint32_t x, uint32_t y, uint32_t z);
 void input(dr_input what, bool on);
 void press(dr_input what);
-void stop_input(bool on);            /* both contacts */
-void clear_fault(void);              /* key off and on */
+void stop_input(bool on); /* both contacts */
+void clear_fault(void);   /* key off and on */
 
 /* The test as the controller. */
 void device_says(const void *bytes, size_t count);
@@ -106,7 +106,7 @@ uint32_t wire_stops(void);
 
 void expect_heard(const void *bytes, size_t count);
 void expect_cr(void);
-void expect_silence(void);           /* the host has heard nothing that was not taken yet */
+void expect_silence(void); /* the host has heard nothing that was not taken yet */
 void expect_state(dr_guard_state state);
 void expect_refused(dr_reason reason); /* the last refusal */
 void expect_fault(dr_fault fault);
