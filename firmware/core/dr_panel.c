@@ -194,6 +194,8 @@ static void turn_manipulator(dr_panel *p, dr_us now, bool up, uint32_t clicks)
         if (c->drives[drive].stage != DR_STAGE_NONE)
             connected[count++] = drive;
     }
+    if (count == 0)
+        return;
     if (SWITCH(p->inside_read, ROE_NOT_CYCLICAL)) {
         const uint32_t room = up ? count - 1u - at : at;
         clicks = clicks < room ? clicks : room;
@@ -243,7 +245,7 @@ bool dr_panel_turn(dr_panel *p, dr_us now, dr_knob knob, int16_t detents)
     if (count == 0)
         return true;
     if (knob == DR_KNOB_MANIPULATOR) {
-        if (is_at_rest(p)) /* whatever is locked, the other drives can be reached */
+        if (p->controller->state == DR_STATE_REST) /* whatever is locked, the other drives can be reached */
             turn_manipulator(p, now, clockwise, count);
     } else if (are_knobs_alive(p)) {
         if (knob == DR_KNOB_MODE)
