@@ -1,13 +1,15 @@
-#define _GNU_SOURCE /* flock, struct stat's nanoseconds */
+#define _GNU_SOURCE /* SOCK_CLOEXEC, struct stat's nanoseconds */
 #include "link.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <limits.h>
+#include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/file.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #define PTS "/dev/pts/"
@@ -56,32 +58,44 @@ static bool is_stale(const char *link_path, const char *pts_path, char *why, siz
         return true;
     if (is_younger(&port_is.st_ctim, &link_is.st_mtim))
         return true;
-    (void)snprintf(why, room,
-                   "%s leads to %s, which is in use: another emulator has this link. Stop it, or choose another path",
-                   link_path, target);
+    (void)snprintf(why, room, "%s leads to %s, which somebody uses; it stays. Choose another path", link_path, target);
     return false;
 }
 
-/* Keeps others from making links in the same directory meanwhile. Where that is impossible, goes on without. */
-static int lock_directory(const char *link_path)
+/* A number for a name of any length. */
+static uint64_t digest(const char *name)
 {
-    char directory[PATH_MAX];
-    const char *const slash = strrchr(link_path, '/');
-    const size_t length = slash == NULL ? 0 : (size_t)(slash - link_path);
-    if (length >= sizeof directory)
-        return -1;
-    memcpy(directory, link_path, length);
-    directory[length] = '\0';
-    const int fd = open(slash == NULL ? "." : length == 0 ? "/" : directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd >= 0)
-        (void)flock(fd, LOCK_EX);
-    return fd;
+    uint64_t sum = UINT64_C(0xCBF29CE484222325); /* FNV-1a */
+    for (; *name != '\0'; name++)
+        sum = (sum ^ (unsigned char)*name) * UINT64_C(0x100000001B3);
+    return sum;
 }
 
-static void unlock_directory(int fd)
+/* The same link has the same lock however its path is spelled. -1: errno is EADDRINUSE where an emulator has it. */
+static int lock_name(const char *link_path)
 {
-    if (fd >= 0)
-        (void)close(fd);
+    char directory[PATH_MAX];
+    struct stat is;
+    const char *const slash = strrchr(link_path, '/');
+    const char *const name = slash == NULL ? link_path : slash + 1;
+    const int length = slash == NULL ? 0 : (int)(slash - link_path);
+    (void)snprintf(directory, sizeof directory, "%.*s", length, link_path);
+    if (stat(slash == NULL ? "." : length == 0 ? "/" : directory, &is) != 0)
+        return -1;
+
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int text =
+        snprintf(address.sun_path + 1, sizeof address.sun_path - 1, "dryrig-emu link %llx/%llx/%llx",
+                 (unsigned long long)is.st_dev, (unsigned long long)is.st_ino, (unsigned long long)digest(name));
+    const socklen_t size = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1u + (size_t)text);
+    const int lock = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (lock >= 0 && bind(lock, (const struct sockaddr *)&address, size) != 0) {
+        const int reason = errno;
+        (void)close(lock);
+        errno = reason;
+        return -1;
+    }
+    return lock;
 }
 
 static bool make_locked(const char *link_path, const char *pts_path, char *why, size_t room)
@@ -98,19 +112,24 @@ static bool make_locked(const char *link_path, const char *pts_path, char *why, 
     return false;
 }
 
-bool link_make(const char *link_path, const char *pts_path, char *why, size_t room)
+int link_make(const char *link_path, const char *pts_path, char *why, size_t room)
 {
-    const int lock = lock_directory(link_path);
-    const bool made = make_locked(link_path, pts_path, why, room);
-    unlock_directory(lock);
-    return made;
+    const int lock = lock_name(link_path);
+    if (lock < 0 && errno == EADDRINUSE)
+        (void)snprintf(why, room, "%s is in use by another emulator; stop that, or choose another path", link_path);
+    else if (lock < 0)
+        (void)snprintf(why, room, "cannot make the link %s: %s", link_path, strerror(errno));
+    else if (make_locked(link_path, pts_path, why, room))
+        return lock;
+    if (lock >= 0)
+        (void)close(lock);
+    return -1;
 }
 
-void link_remove(const char *link_path, const char *pts_path)
+void link_remove(const char *link_path, const char *pts_path, int lock)
 {
     char target[PATH_MAX];
-    const int lock = lock_directory(link_path);
     if (target_of(link_path, target) && strcmp(target, pts_path) == 0)
         (void)unlink(link_path);
-    unlock_directory(lock);
+    (void)close(lock);
 }

@@ -1,20 +1,21 @@
 /* link: the stable name of a port: a symbolic link to /dev/pts/N, whose N changes with every start.
  *
- * Whose link is it? A link of ours is made after its port and leads to it for as long as the emulator lives. So it is stale,
- * and may be replaced, when it leads to a /dev/pts/N that does not exist or that was made after the link (a number that was
- * given to somebody else since). Anything else at that path is somebody's and stays. This leaves nothing behind, no lock
- * file, even after kill -9. Two emulators that start at once are kept apart by a lock on the directory, for that moment.
+ * Whose link is it? An emulator holds a lock on the link's name for as long as it lives: a socket of Linux's abstract
+ * namespace, which leaves nothing behind, even after kill -9 (a lock file would). With the lock in hand, what stands at that
+ * path belongs to no emulator that lives. It is a stale one of ours, and may be replaced, when it leads to a /dev/pts/N that
+ * does not exist or that was made after the link: a number that was given to somebody else since. Anything else is
+ * somebody's and stays, another program's link to its own living terminal as well.
  *
  * Thread-safety: functions of their arguments only. */
 #ifndef LINK_H
 #define LINK_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
-/* Makes the link. False: why[] says what is in the way and what to do; nothing was changed. */
-bool link_make(const char *link_path, const char *pts_path, char *why, size_t room);
+/* Makes the link. Returns the lock, a descriptor to be kept open until link_remove(). -1: why[] says what is in the way and
+ * what to do; nothing was changed. */
+int link_make(const char *link_path, const char *pts_path, char *why, size_t room);
 /* Removes it, if it still leads to this port. */
-void link_remove(const char *link_path, const char *pts_path);
+void link_remove(const char *link_path, const char *pts_path, int lock);
 
 #endif

@@ -86,7 +86,7 @@ static void advance(station *s, uint64_t now_us)
     uint8_t bytes[CHUNK];
     size_t count;
     while (instrument_run(&s->ins, now_us, bytes, sizeof bytes, &count)) {
-        if (s->trace.file != NULL)
+        if (s->ins.controller.notes != NULL)
             trace_tell(&s->trace, &s->ins);
         if (count > 0)
             (void)pty_put(&s->port, bytes, count);
@@ -134,18 +134,12 @@ static void tell_loss(station *s)
     say(s, "the host does not read: bytes for it are lost");
 }
 
-static void look(station *s)
-{
-    const bool was_open = s->port.is_open;
-    pty_look(&s->port);
-    if (s->port.is_open != was_open)
-        say(s, was_open ? "nobody has the port open any more" : "the port has been opened");
-}
-
+/* Who has opened and closed the port. */
 static void read_hints(const loop *l, station *s)
 {
     char hints[1024];
     ssize_t length;
+    const bool was_open = s->port.opens > 0;
     while ((length = read(l->inotify, hints, sizeof hints)) > 0) {
         struct inotify_event hint;
         for (const char *at = hints; at < hints + length; at += sizeof hint + hint.len) {
@@ -154,6 +148,11 @@ static void read_hints(const loop *l, station *s)
                 pty_hint(&s->port, hint.mask);
         }
     }
+    if (was_open && s->port.was_left)
+        say(s, "nobody has the port open any more");
+    if (s->port.opens > 0 && (!was_open || s->port.was_left))
+        say(s, "the port has been opened");
+    pty_look(&s->port);
 }
 
 /* What was due comes first, then who is there, then what they have sent. */
@@ -164,8 +163,6 @@ static void serve(const loop *l, station *s, uint32_t events, bool has_hints)
     advance(s, now_us);
     if (has_hints)
         read_hints(l, s);
-    if (has_hints || (events & EPOLLHUP) != 0)
-        look(s);
     if ((events & EPOLLIN) != 0 || s->has_unread)
         listen(s, now_ns, now_us);
     watch_writing(l, s, !pty_flush(&s->port));
@@ -243,7 +240,7 @@ static int open_signals(void)
 static void watch(const loop *l, int fd, uint32_t events, void *who)
 {
     struct epoll_event event = {.events = events, .data.ptr = who};
-    if (fd >= 0 && epoll_ctl(l->epoll, EPOLL_CTL_ADD, fd, &event) != 0) {
+    if (epoll_ctl(l->epoll, EPOLL_CTL_ADD, fd, &event) != 0) {
         (void)fprintf(stderr, "dryrig-emu: cannot wait for events: %s\n", strerror(errno));
         exit(1);
     }
@@ -331,10 +328,10 @@ int main(int argc, char **argv)
 
     l.signals = open_signals();
     l.epoll = epoll_create1(EPOLL_CLOEXEC);
-    if (l.signals < 0 || l.epoll < 0)
-        return fail("cannot wait for events");
-    l.inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC); /* without it, only a very quick reopening goes unnoticed */
-    (void)prctl(PR_SET_TIMERSLACK, 1ul, 0ul, 0ul, 0ul);  /* bytes are 78 us apart, the usual slack is 50 us */
+    l.inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    if (l.signals < 0 || l.epoll < 0 || l.inotify < 0)
+        return fail("cannot wait for events (/proc/sys/fs/inotify and ulimit -n have limits)");
+    (void)prctl(PR_SET_TIMERSLACK, 1ul, 0ul, 0ul, 0ul); /* bytes are 78 us apart, the usual slack is 50 us */
 
     const char *const wrong = pty_open(&s.port, l.inotify);
     if (wrong != NULL)
@@ -344,12 +341,13 @@ int main(int argc, char **argv)
     watch(&l, s.port.fd, EPOLLIN | EPOLLET, &s);
 
     char why[512];
-    if (o.link != NULL && !link_make(o.link, s.port.path, why, sizeof why)) {
+    const int lock = o.link == NULL ? -1 : link_make(o.link, s.port.path, why, sizeof why);
+    if (o.link != NULL && lock < 0) {
         (void)fprintf(stderr, "dryrig-emu: --link: %s\n", why);
         return 1;
     }
     const int status = start_and_run(&l, &s, &o);
     if (o.link != NULL)
-        link_remove(o.link, s.port.path);
+        link_remove(o.link, s.port.path, lock);
     return status;
 }

@@ -4,12 +4,12 @@
  *   value unchanged. A host may set it as it likes while it has it open.
  * - What has not been read when the last one closes it is gone, and what is sent while nobody has it open goes nowhere.
  *   What a host wrote before it closed was sent and arrives.
- * - A host that does not read holds nobody up: the kernel keeps some 17,000 bytes, pty a few more, and what comes then is lost
- *   and counted, piece by piece (a piece is what was given to pty_put() at once).
+ * - A host that does not read holds nobody up: the kernel keeps some 17,000 bytes, pty a few more, and what comes then is
+ *   lost and counted, piece by piece (a piece is what was given to pty_put() at once).
  *
- * How it knows who is there: the emulator does not hold the host's end open itself, so the kernel says when nobody does
- * (POLLHUP). That is the truth, but only about the present. A host that closes and opens again before the emulator has
- * looked is found by inotify, whose events are a hint only: equal ones in a row melt into one.
+ * Who is there? pty holds the host's end open itself, to look after it, and so the kernel never says that nobody has it
+ * open; inotify does, which tells of every opening and closing. It melts equal events in a row into one, so the directory
+ * is watched as well: its events come between those of the port, and none is lost.
  *
  * Thread-safety: one thread at a time per pty. */
 #ifndef PTY_H
@@ -23,24 +23,24 @@
 #define PTY_WAITING_MAX 16384u
 
 typedef struct {
-    int fd;               /* the emulator's end; non-blocking. Readable: pty_read(); hung up: pty_look() */
-    int watch;            /* inotify watch descriptor, -1: none */
-    char path[32];        /* the host's end: /dev/pts/N */
-    struct termios raw;   /* how the host's end is when nobody has it open */
-    bool is_open;         /* somebody had it open when pty last looked */
-    unsigned opens;       /* how many have it open, by the hints */
-    uint64_t lost_bytes;  /* for the host, which did not read */
+    int fd;             /* the emulator's end; non-blocking */
+    int host_fd;        /* the host's end, to look after it: never read, never written */
+    int watch;          /* what inotify calls it */
+    char path[32];      /* the host's end: /dev/pts/N */
+    struct termios raw; /* how the host's end is while nobody has it open */
+    unsigned opens;     /* how many have it open */
+    bool was_left;      /* nobody had it open at some time since pty_look() */
+    uint64_t lost_bytes;
     size_t waiting_count; /* bytes that the kernel has not taken yet */
     uint8_t waiting[PTY_WAITING_MAX];
 } pty;
 
-/* Opens one. inotify_fd may be -1. NULL, or what could not be done (errno says why); then nothing is left open. */
+/* Opens one. NULL, or what could not be done (errno says why); then nothing is left open. */
 const char *pty_open(pty *p, int inotify_fd);
 void pty_close(pty *p);
 
-/* The inotify descriptor has this to say about p->watch. */
+/* The inotify descriptor has this to say about p->watch. After all that it has to say, pty_look() acts on it. */
 void pty_hint(pty *p, uint32_t inotify_mask);
-/* Sees whether anybody has it open. Call it after hints, and when p->fd has hung up. */
 void pty_look(pty *p);
 
 /* What the host has sent; 0: nothing now. */

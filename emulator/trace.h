@@ -28,7 +28,7 @@ typedef struct {
 /* Opens a file, or stderr where path is "-", and makes the instrument write notes. False: errno says why. */
 bool trace_open(trace *t, const char *path, instrument *ins);
 void trace_close(trace *t);
-/* Tells what the instrument has noted. Call it whenever instrument_run() has returned true. */
+/* Tells what the instrument has noted, or, when the file is no more, forgets it. Call it whenever instrument_run() has returned true. */
 void trace_tell(trace *t, const instrument *ins);
 /* Tells an event that is not the controller's. */
 void trace_event(trace *t, const instrument *ins, const char *text);
