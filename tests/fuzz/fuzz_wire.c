@@ -27,7 +27,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         const uint8_t had = framer.have;
         const dr_framed framed = dr_framer_push(&framer, kind, firmware, data[k], &command);
         must((framer.have == 0 && framer.want == 0) ||
-             (0 < framer.have && framer.have < framer.want && framer.want <= DR_FRAME_MAX) || framed == DR_FRAMED_WHOLE);
+             (0 < framer.have && framer.have < framer.want && framer.want <= DR_FRAME_MAX) ||
+             framed == DR_FRAMED_WHOLE);
         must(had == 0 || framed == DR_FRAMED_PART || framed == DR_FRAMED_WHOLE);
         if (framed == DR_FRAMED_WHOLE) {
             uint8_t again[DR_FRAME_MAX];

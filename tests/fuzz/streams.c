@@ -32,7 +32,9 @@ static void one_stream(unsigned long n, uint64_t *taken)
     (void)any();
     for (size_t k = 0; k < STREAM_BYTES; k++) { /* a third of the streams is noise, the others are rich in commands */
         const uint32_t r = any();
-        bytes[k] = n % 3 == 0 || (r & 3) == 0 ? (uint8_t)(r >> 8) : (r & 3) == 1 ? 0 : (uint8_t)codes[(r >> 8) % (sizeof codes - 1)];
+        bytes[k] = n % 3 == 0 || (r & 3) == 0 ? (uint8_t)(r >> 8)
+                   : (r & 3) == 1             ? 0
+                                              : (uint8_t)codes[(r >> 8) % (sizeof codes - 1)];
     }
     torture_input input = {bytes, 64, 0};
     torture_begin(&t, &input);

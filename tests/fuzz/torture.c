@@ -17,10 +17,7 @@ static void breach(const char *what, int line)
         }                                                                                                              \
     } while (0)
 
-uint8_t torture_next(torture_input *input)
-{
-    return input->at < input->count ? input->bytes[input->at++] : 0;
-}
+uint8_t torture_next(torture_input *input) { return input->at < input->count ? input->bytes[input->at++] : 0; }
 
 void torture_begin(torture *t, torture_input *input)
 {
@@ -86,7 +83,8 @@ void torture_check(const torture *t)
     dr_us when;
     if (dr_controller_due(c, &when)) {
         MUST(c->state == DR_STATE_MOVING || c->state == DR_STATE_BOOTING);
-        MUST((uint32_t)(when - t->now) <= UINT32_C(1300000000)); /* the longest move: 50 mm at the lowest speed, and twice that */
+        MUST((uint32_t)(when - t->now) <=
+             UINT32_C(1300000000)); /* the longest move: 50 mm at the lowest speed, and twice that */
     } else {
         MUST(c->state != DR_STATE_MOVING && c->state != DR_STATE_BOOTING);
     }
@@ -129,7 +127,8 @@ void torture_poke(torture *t, torture_input *input)
     memset(&hand, 0, sizeof hand);
     const uint8_t what = torture_next(input);
     if (what & 128) { /* a button of the panel */
-        (void)dr_controller_apply(&t->c, t->now, (dr_effect)((what & 15) % (DR_EFFECT_STORE_WORK + 1)), torture_next(input));
+        (void)dr_controller_apply(&t->c, t->now, (dr_effect)((what & 15) % (DR_EFFECT_STORE_WORK + 1)),
+                                  torture_next(input));
         torture_check(t);
         return;
     }
@@ -137,8 +136,8 @@ void torture_poke(torture *t, torture_input *input)
     hand.drive = (uint8_t)((what >> 2 & 3) % t->c.drive_count);
     hand.stage = (uint8_t)((what >> 4 & 7) + (t->c.kind == DR_TRIO ? 0 : DR_STAGE_TRIO_MP265));
     dr_stage stage;
-    if (hand.what == DR_HAND_CONNECT &&
-        dr_stage_fits((dr_stage_id)hand.stage, (dr_kind)t->c.kind, t->c.firmware, (uint8_t)(hand.drive + 1)) != DR_FIT_YES) {
+    if (hand.what == DR_HAND_CONNECT && dr_stage_fits((dr_stage_id)hand.stage, (dr_kind)t->c.kind, t->c.firmware,
+                                                      (uint8_t)(hand.drive + 1)) != DR_FIT_YES) {
         hand.stage = DR_STAGE_NONE;
         if (t->c.kind == DR_TRIO) {
             return; /* its manipulator is not unplugged */
@@ -166,7 +165,8 @@ void torture_wait(torture *t)
 
 void torture_revive(torture *t)
 {
-    static const dr_hand off = {DR_HAND_POWER_OFF, 0, DR_STAGE_NONE, {0}}, on = {DR_HAND_POWER_ON, 0, DR_STAGE_NONE, {0}};
+    static const dr_hand off = {DR_HAND_POWER_OFF, 0, DR_STAGE_NONE, {0}},
+                         on = {DR_HAND_POWER_ON, 0, DR_STAGE_NONE, {0}};
     (void)dr_controller_poke(&t->c, t->now, &off);
     torture_check(t);
     MUST(dr_controller_poke(&t->c, t->now, &on));
@@ -189,7 +189,8 @@ void torture_revive(torture *t)
         dr_controller_position(&t->c, t->c.active, t->now, at);
         const uint8_t *xyz = t->c.kind == DR_MPC ? reply + 1 : reply;
         for (unsigned axis = 0; axis < DR_AXES; axis++, xyz += 4) {
-            MUST(((uint32_t)xyz[0] | (uint32_t)xyz[1] << 8 | (uint32_t)xyz[2] << 16 | (uint32_t)xyz[3] << 24) == at[axis]);
+            MUST(((uint32_t)xyz[0] | (uint32_t)xyz[1] << 8 | (uint32_t)xyz[2] << 16 | (uint32_t)xyz[3] << 24) ==
+                 at[axis]);
         }
         MUST(t->c.kind == DR_MPC ? reply[0] == t->c.active + 1 : reply[12] == t->c.angle_deg);
         MUST(reply[13] == 0x0D);

@@ -22,10 +22,18 @@ static const struct {
     const char *name;
     dr_stage_id id;
 } stages[] = {
-    {"NONE", DR_STAGE_NONE},             {"TRIO_MP845", DR_STAGE_TRIO_MP845}, {"TRIO_MP865", DR_STAGE_TRIO_MP865},
-    {"TRIO_MP285", DR_STAGE_TRIO_MP285}, {"TRIO_MP265", DR_STAGE_TRIO_MP265}, {"MPC_MP225", DR_STAGE_MPC_MP225},
-    {"MPC_MP285", DR_STAGE_MPC_MP285},   {"MPC_MP265", DR_STAGE_MPC_MP265},   {"MPC_MP845", DR_STAGE_MPC_MP845},
-    {"MPC_MP865", DR_STAGE_MPC_MP865},   {"MPC_MT800", DR_STAGE_MPC_MT800},   {"MPC_MOM", DR_STAGE_MPC_MOM},
+    {"NONE", DR_STAGE_NONE},
+    {"TRIO_MP845", DR_STAGE_TRIO_MP845},
+    {"TRIO_MP865", DR_STAGE_TRIO_MP865},
+    {"TRIO_MP285", DR_STAGE_TRIO_MP285},
+    {"TRIO_MP265", DR_STAGE_TRIO_MP265},
+    {"MPC_MP225", DR_STAGE_MPC_MP225},
+    {"MPC_MP285", DR_STAGE_MPC_MP285},
+    {"MPC_MP265", DR_STAGE_MPC_MP265},
+    {"MPC_MP845", DR_STAGE_MPC_MP845},
+    {"MPC_MP865", DR_STAGE_MPC_MP865},
+    {"MPC_MT800", DR_STAGE_MPC_MT800},
+    {"MPC_MOM", DR_STAGE_MPC_MOM},
 };
 
 static dr_stage_id stage_named(const char *name)
@@ -39,10 +47,7 @@ static dr_stage_id stage_named(const char *name)
     return DR_STAGE_NONE;
 }
 
-static char *word(void)
-{
-    return strtok(NULL, " \n");
-}
+static char *word(void) { return strtok(NULL, " \n"); }
 
 static uint64_t number(int base)
 {

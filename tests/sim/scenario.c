@@ -9,10 +9,7 @@ dr_notes notes;
 
 void setUp(void) {}
 
-void tearDown(void)
-{
-    sim_free(&rig);
-}
+void tearDown(void) { sim_free(&rig); }
 
 void prepare(dr_kind kind)
 {
@@ -22,10 +19,7 @@ void prepare(dr_kind kind)
     rig.c.notes = &notes;
 }
 
-void start(void)
-{
-    sim_start(&rig, clock_at_start);
-}
+void start(void) { sim_start(&rig, clock_at_start); }
 
 static void place_before_start(uint32_t x, uint32_t y, uint32_t z)
 {
@@ -119,20 +113,14 @@ static bool poke(dr_hand_kind what, uint8_t drive, dr_stage_id stage, uint32_t x
     return done;
 }
 
-bool power(bool on)
-{
-    return poke(on ? DR_HAND_POWER_ON : DR_HAND_POWER_OFF, 0, DR_STAGE_NONE, 0, 0, 0);
-}
+bool power(bool on) { return poke(on ? DR_HAND_POWER_ON : DR_HAND_POWER_OFF, 0, DR_STAGE_NONE, 0, 0, 0); }
 
 bool place(uint8_t drive, uint32_t x, uint32_t y, uint32_t z)
 {
     return poke(DR_HAND_PLACE, drive, DR_STAGE_NONE, x, y, z);
 }
 
-bool plug(uint8_t drive, dr_stage_id stage)
-{
-    return poke(DR_HAND_CONNECT, drive, stage, 0, 0, 0);
-}
+bool plug(uint8_t drive, dr_stage_id stage) { return poke(DR_HAND_CONNECT, drive, stage, 0, 0, 0); }
 
 void expect(uint64_t at_us, const uint8_t *bytes, size_t count)
 {

@@ -33,10 +33,7 @@ void sim_free(sim *s)
     s->count = s->room = s->seen = 0;
 }
 
-dr_us sim_clock(const sim *s)
-{
-    return s->clock + (uint32_t)(s->now_us & UINT32_MAX);
-}
+dr_us sim_clock(const sim *s) { return s->clock + (uint32_t)(s->now_us & UINT32_MAX); }
 
 static void keep(sim *s, uint8_t byte)
 {
@@ -111,10 +108,7 @@ void sim_run_to(sim *s, uint64_t until_us)
     }
 }
 
-void sim_run(sim *s, uint64_t span_us)
-{
-    sim_run_to(s, s->now_us + span_us);
-}
+void sim_run(sim *s, uint64_t span_us) { sim_run_to(s, s->now_us + span_us); }
 
 void sim_run_out(sim *s)
 {
@@ -127,17 +121,8 @@ void sim_run_out(sim *s)
     }
 }
 
-void sim_jump(sim *s, uint64_t span_us)
-{
-    s->now_us += span_us;
-}
+void sim_jump(sim *s, uint64_t span_us) { s->now_us += span_us; }
 
-void sim_push(sim *s, const uint8_t *bytes, size_t count)
-{
-    dr_controller_push(&s->c, sim_clock(s), bytes, count);
-}
+void sim_push(sim *s, const uint8_t *bytes, size_t count) { dr_controller_push(&s->c, sim_clock(s), bytes, count); }
 
-bool sim_poke(sim *s, const dr_hand *hand)
-{
-    return dr_controller_poke(&s->c, sim_clock(s), hand);
-}
+bool sim_poke(sim *s, const dr_hand *hand) { return dr_controller_poke(&s->c, sim_clock(s), hand); }

@@ -16,14 +16,14 @@ typedef struct {
 typedef struct {
     dr_controller c;
     dr_drive drives[DR_PORTS];
-    dr_us clock;          /* what the controller's clock shows at now_us == 0 */
+    dr_us clock; /* what the controller's clock shows at now_us == 0 */
     uint64_t now_us;
-    uint32_t byte_us;     /* for how long a byte holds the line to the host; 0: not at all */
+    uint32_t byte_us; /* for how long a byte holds the line to the host; 0: not at all */
     uint64_t line_free_us;
-    sim_byte *out;        /* all that the host has got */
+    sim_byte *out; /* all that the host has got */
     size_t count, room;
-    size_t seen;          /* of which the test has looked at so many */
-    uint64_t visits;      /* due instants at which it came */
+    size_t seen;     /* of which the test has looked at so many */
+    uint64_t visits; /* due instants at which it came */
 } sim;
 
 /* The documented controller, not yet started: TRIO with an MP-845; MPC-200 with two MP-225 on ports 1 and 2. */

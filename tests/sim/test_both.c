@@ -11,7 +11,7 @@ typedef struct {
     uint16_t firmware;
     uint8_t frame[14];
     uint8_t length;
-    uint8_t reply; /* bytes of its reply */
+    uint8_t reply;     /* bytes of its reply */
     uint32_t lasts_us; /* from 160, 160, 160, home and targets being 0, 0, 0 */
 } command;
 
@@ -296,7 +296,7 @@ static void control_bytes_inside_a_frame_are_data(void)
     mpc_at(0, 0, 0);
     send_point('M', 0x030303, 0, 0x0D0D);
     sim_run(&rig, 10);
-    expect_nothing(); /* nothing was interrupted */
+    expect_nothing();                    /* nothing was interrupted */
     send_point('M', 0x03, 0x0D, 0x0303); /* nor while it waits */
     sim_run_out(&rig);
     expect_at(0, 0x03, 0x0D, 0x0303);
@@ -316,7 +316,8 @@ static void early_commands_start_in_order_when_the_last_reply_has_left(void)
     TEST_ASSERT_EQUAL(5, rig.c.kept_commands);
     sim_run_out(&rig);
     const uint64_t first = takes_us(16, 4, 3000);
-    static const uint8_t between[] = {0x0D, 1, 16, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x0D, 2, 1, 1, 0, 0, 0x0D, 1, 0x21, 3, 0x0D};
+    static const uint8_t between[] = {0x0D, 1,    16, 0, 0, 0, 0, 0,    0, 0,    0, 0,   0,
+                                      0,    0x0D, 2,  1, 1, 0, 0, 0x0D, 1, 0x21, 3, 0x0D};
     for (unsigned k = 0; k < sizeof between; k++) {
         TEST_ASSERT_EQUAL_HEX8(between[k], rig.out[k].byte);
         TEST_ASSERT_EQUAL_UINT64(first + 78 * k, rig.out[k].at_us);

@@ -52,6 +52,43 @@ static void power_off_takes_the_reply_with_it(void)
     TEST_ASSERT_EQUAL(got + 4, rig.count);
 }
 
+static void a_switch_that_is_there_already_changes_nothing(void)
+{
+    mpc_at(0, 0, 0);
+    send_code('O');
+    expect_cr(0);
+    send_point('M', 1600, 0, 0);
+    sim_run(&rig, 100);
+    const bool on_again = power(true);
+    TEST_ASSERT_EQUAL(DR_STATE_MOVING, rig.c.state);
+    TEST_ASSERT_TRUE(rig.c.streaming);
+    sim_run_out(&rig);
+    expect_cr(33334);
+    expect_idle();
+    TEST_ASSERT_TRUE(power(false));
+    TEST_ASSERT_EQUAL(on_again, power(false)); /* one rule for both */
+    TEST_ASSERT_EQUAL(DR_STATE_OFF, rig.c.state);
+}
+
+static void an_unplugged_trio_moves_nothing(void)
+{
+    trio_at(80, 80, 80);
+    TEST_ASSERT_TRUE(plug(0, DR_STAGE_NONE));
+    send_axis('x', 4000);
+    send_code('h');
+    send_code('R');
+    sim_run(&rig, 100000000);
+    TEST_ASSERT_TRUE(power(false));
+    TEST_ASSERT_TRUE(power(true));
+    sim_run(&rig, 100000000);
+    dr_us when;
+    TEST_ASSERT_FALSE(dr_controller_due(&rig.c, &when));
+    TEST_ASSERT_TRUE(plug(0, DR_STAGE_TRIO_MP285));
+    rig.seen = rig.count;
+    send_code('c');
+    TEST_ASSERT_EQUAL(rig.seen + 14, rig.count);
+}
+
 static void after_power_on_the_lowest_connected_drive_is_active(void)
 {
     mpc_at(0, 0, 0);
@@ -96,6 +133,26 @@ static void knobs_move_what_is_at_rest(void)
     TEST_ASSERT_TRUE(power(false));
     TEST_ASSERT_FALSE(place(0, 1, 1, 1));
     expect_at(0, 0, 0, 0);
+}
+
+static void knobs_end_where_the_travel_ends(void)
+{
+    mpc_at(0, 0, 0);
+    TEST_ASSERT_TRUE(place(0, 400001, UINT32_MAX, 399999));
+    expect_at(0, 400000, 400000, 399999);
+    expect_idle();
+}
+
+static void hands_find_nothing_that_is_not_there(void)
+{
+    mpc_at(0, 0, 0);
+    TEST_ASSERT_FALSE(place(4, 1, 1, 1));
+    TEST_ASSERT_FALSE(plug(4, DR_STAGE_MPC_MP225));
+    const dr_hand strange = {200, 0, 0, {1, 1, 1}}; /* whatever it answers, it does nothing */
+    (void)sim_poke(&rig, &strange);
+    (void)dr_controller_apply(&rig.c, sim_clock(&rig), (dr_effect)200, 0);
+    expect_at(0, 0, 0, 0);
+    expect_idle();
 }
 
 static void a_drive_can_be_plugged_in(void)
@@ -235,8 +292,8 @@ static void notes_tell_what_happened_in_order(void)
     sim_run(&rig, 10);
     send_code('K');
     sim_run_out(&rig);
-    static const dr_note_kind order[] = {DR_NOTE_REQUEST, DR_NOTE_LEG,     DR_NOTE_REQUEST, DR_NOTE_KEPT,
-                                         DR_NOTE_ARRIVED, DR_NOTE_REPLY,   DR_NOTE_REPLY};
+    static const dr_note_kind order[] = {DR_NOTE_REQUEST, DR_NOTE_LEG,   DR_NOTE_REQUEST, DR_NOTE_KEPT,
+                                         DR_NOTE_ARRIVED, DR_NOTE_REPLY, DR_NOTE_REPLY};
     static const uint8_t move[13] = {'M', 16, 0, 0, 0, 32}, k[4] = {1, 0x21, 3, 0x0D};
     const uint32_t us = takes_us(32, 4, 3000);
     for (size_t i = 0; i < sizeof order / sizeof order[0]; i++) {
@@ -299,9 +356,13 @@ static void tests(void)
 {
     RUN_TEST(power_off_in_a_move_leaves_the_axes_where_they_are);
     RUN_TEST(power_off_takes_the_reply_with_it);
+    RUN_TEST(a_switch_that_is_there_already_changes_nothing);
+    RUN_TEST(an_unplugged_trio_moves_nothing);
     RUN_TEST(after_power_on_the_lowest_connected_drive_is_active);
     RUN_TEST(work_positions_outlive_power_off);
     RUN_TEST(knobs_move_what_is_at_rest);
+    RUN_TEST(knobs_end_where_the_travel_ends);
+    RUN_TEST(hands_find_nothing_that_is_not_there);
     RUN_TEST(a_drive_can_be_plugged_in);
     RUN_TEST(an_empty_controller_wakes_up_with_its_first_drive);
     RUN_TEST(a_drive_that_is_unplugged_in_a_move_never_answers);

@@ -4,15 +4,9 @@
 #include <string.h>
 
 /* How long an MP-225 takes at full speed. */
-static uint32_t full(uint32_t steps)
-{
-    return takes_us(steps, 4, 3000);
-}
+static uint32_t full(uint32_t steps) { return takes_us(steps, 4, 3000); }
 
-static uint32_t larger(uint32_t a, uint32_t b)
-{
-    return a > b ? a : b;
-}
+static uint32_t larger(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
 /* The reply that has just come, and nothing more. */
 #define EXPECT(...)                                                                                                    \
@@ -167,8 +161,9 @@ static void orthogonal_moves_run_each_axis_at_full_speed(void)
         uint16_t firmware;
         uint32_t quanta, um_per_s;
     } stages[] = {
-        {DR_STAGE_MPC_MP225, 0x321, 4, 3000}, {DR_STAGE_MPC_MP285, 0x321, 4, 5000}, {DR_STAGE_MPC_MP265, 0x321, 4, 3000},
-        {DR_STAGE_MPC_MP845, 0x321, 3, 3000}, {DR_STAGE_MPC_MP865, 0x321, 3, 3000}, {DR_STAGE_MPC_MT800, 0x321, 5, 5000},
+        {DR_STAGE_MPC_MP225, 0x321, 4, 3000}, {DR_STAGE_MPC_MP285, 0x321, 4, 5000},
+        {DR_STAGE_MPC_MP265, 0x321, 4, 3000}, {DR_STAGE_MPC_MP845, 0x321, 3, 3000},
+        {DR_STAGE_MPC_MP865, 0x321, 3, 3000}, {DR_STAGE_MPC_MT800, 0x321, 5, 5000},
         {DR_STAGE_MPC_MOM, 0x316, 4, 5000},
     };
     for (size_t i = 0; i < 7; i++) {
@@ -234,8 +229,8 @@ static void corner_of(unsigned diagonal, const uint32_t start_at[3], uint32_t co
 
 static void home_runs_along_the_diagonal(void)
 {
-    static const uint32_t from[][3] = {
-        {16000, 3200, 16000}, {8000, 0, 16000}, {16000, 160, 800}, {0, 160, 1600}, {1600, 160, 0}, {7, 0, 3}, {0, 320, 0}};
+    static const uint32_t from[][3] = {{16000, 3200, 16000}, {8000, 0, 16000}, {16000, 160, 800}, {0, 160, 1600},
+                                       {1600, 160, 0},       {7, 0, 3},        {0, 320, 0}};
     for (unsigned diagonal = 0; diagonal < 16; diagonal++) {
         for (size_t i = 0; i < 7; i++) {
             uint32_t corner[3];
@@ -248,9 +243,10 @@ static void home_runs_along_the_diagonal(void)
             const uint32_t leg1 = full(larger(from[i][0] - corner[0], from[i][2] - corner[2]));
             const uint32_t leg2 = full(larger(corner[1], larger(corner[0], corner[2])));
             sim_run_to(&rig, leg1 / 2);
-            expect_at(0, from[i][0] - (leg1 == 0 ? 0 : (uint32_t)((uint64_t)(from[i][0] - corner[0]) * (leg1 / 2) / leg1)),
-                      from[i][1],
-                      from[i][2] - (leg1 == 0 ? 0 : (uint32_t)((uint64_t)(from[i][2] - corner[2]) * (leg1 / 2) / leg1)));
+            expect_at(
+                0, from[i][0] - (leg1 == 0 ? 0 : (uint32_t)((uint64_t)(from[i][0] - corner[0]) * (leg1 / 2) / leg1)),
+                from[i][1],
+                from[i][2] - (leg1 == 0 ? 0 : (uint32_t)((uint64_t)(from[i][2] - corner[2]) * (leg1 / 2) / leg1)));
             sim_run_to(&rig, leg1);
             expect_at(0, corner[0], corner[1], corner[2]);
             if (leg2 > 0) {
@@ -448,7 +444,8 @@ static void an_interrupted_calibration_is_remembered(void)
     expect_cr(1000);
     TEST_ASSERT_EQUAL(DR_UNCALIBRATED, rig.drives[0].calibration);
     send_code('C'); /* commands go on working */
-    expect_mpc_position(1000, 1, 1600 - 1600 * 1000 / full(1600), 1600, 1600 - (1600 * 15886 / 28660) * 1000 / full(1600));
+    expect_mpc_position(1000, 1, 1600 - 1600 * 1000 / full(1600), 1600,
+                        1600 - (1600 * 15886 / 28660) * 1000 / full(1600));
     send_code('N'); /* a whole one alone is not enough */
     sim_run_out(&rig);
     expect_cr(rig.now_us);
@@ -595,7 +592,8 @@ static void a_busy_line_skips_microns_and_delays_the_cr_by_a_frame_at_most(void)
             TEST_ASSERT_TRUE(k + 12 <= rig.count);
             TEST_ASSERT_EQUAL_UINT64(at, rig.out[k].at_us);
             TEST_ASSERT_EQUAL_HEX8(0xFF, rig.out[k].byte);
-            const uint32_t x = rig.out[k + 3].byte | (uint32_t)rig.out[k + 4].byte << 8 | (uint32_t)rig.out[k + 5].byte << 16;
+            const uint32_t x =
+                rig.out[k + 3].byte | (uint32_t)rig.out[k + 4].byte << 8 | (uint32_t)rig.out[k + 5].byte << 16;
             TEST_ASSERT_EQUAL_UINT32(16 * newest, x);
             micron = newest;
             taken = at + 11 * 79;

@@ -90,8 +90,8 @@ static void line_with_pauses(uint32_t after_letter, uint32_t after_speed)
 
 static void lines_need_a_pause(void)
 {
-    static const uint32_t pauses[][2] = {{20000, 0}, {0, 20000}, {10000, 10000}, {30000, 0}, {0, 30000}, {40000, 40000},
-                                         {0, 0},     {19999, 0}, {0, 19999},     {10000, 9999}};
+    static const uint32_t pauses[][2] = {{20000, 0},     {0, 20000}, {10000, 10000}, {30000, 0}, {0, 30000},
+                                         {40000, 40000}, {0, 0},     {19999, 0},     {0, 19999}, {10000, 9999}};
     for (unsigned on = 0; on < 2; on++) {
         for (unsigned i = 0; i < 10; i++) {
             mpc_with(on ? DR_QUIRK_S_NEEDS_PAUSE : 0, 0, 0, 0);
@@ -153,7 +153,7 @@ static void speeds_can_be_the_measured_ones(void)
     expect_cr(t);
     send_code('N');
     sim_run_out(&rig);
-    expect_cr(t + 2 * 53764); /* 250 um at 4,650 um/s: 53,763.4 us */
+    expect_cr(t + 2 * 53764);                     /* 250 um at 4,650 um/s: 53,763.4 us */
     trio_with(DR_QUIRK_MEASURED_SPEEDS, 0, 0, 0); /* of an MPC-200 */
     send_line(0, 100, 0, 0);
     sim_run_out(&rig);

@@ -11,7 +11,8 @@ static uint32_t on_the_way(uint32_t from, uint32_t to, uint64_t elapsed, uint64_
     if (elapsed >= lasts) {
         return to;
     }
-    return to >= from ? from + (uint32_t)((to - from) * elapsed / lasts) : from - (uint32_t)((from - to) * elapsed / lasts);
+    return to >= from ? from + (uint32_t)((to - from) * elapsed / lasts)
+                      : from - (uint32_t)((from - to) * elapsed / lasts);
 }
 
 static void a_trio_line_stops_at_every_microsecond(void)
@@ -60,7 +61,8 @@ static void mpc_moves_stop_at_every_microsecond(void)
             sim_run(&rig, 200000);
             expect_idle();
             if (codes[i] == 'M') {
-                expect_at(0, on_the_way(30, 0, t, x), on_the_way(20, 0, t, leg2), on_the_way(10, 0, t, takes_us(10, 4, 3000)));
+                expect_at(0, on_the_way(30, 0, t, x), on_the_way(20, 0, t, leg2),
+                          on_the_way(10, 0, t, takes_us(10, 4, 3000)));
             } else if (codes[i] == 'S') {
                 expect_at(0, on_the_way(30, 0, t, lasts), on_the_way(20, 0, t, lasts), on_the_way(10, 0, t, lasts));
             } else if (t < leg1) {
@@ -102,8 +104,10 @@ static void play(dr_kind kind, uint64_t session, bool fidget)
         sim_push(&rig, frame, 1 + args);
         sim_pump(&rig);
         const uint64_t until = rig.now_us + any(4) * any(40000);
+        uint64_t fidgets = session + turn;
         while (fidget && rig.now_us < until) { /* somebody comes at instants that mean nothing */
-            const uint64_t step = 1 + (uint64_t)(rand() % 5000);
+            fidgets = fidgets * UINT64_C(6364136223846793005) + 1;
+            const uint64_t step = 1 + (fidgets >> 33) % 5000;
             sim_run_to(&rig, rig.now_us + step < until ? rig.now_us + step : until);
             uint32_t at[DR_AXES];
             dr_controller_position(&rig.c, 0, sim_clock(&rig), at);
@@ -133,7 +137,6 @@ static void check_steps(dr_kind kind, uint32_t byte_us)
             mpc_at(100, 100, 100);
         }
         rig.byte_us = byte_us;
-        srand((unsigned)session);
         play(kind, session, true);
         TEST_ASSERT_EQUAL(count, rig.count);
         for (size_t k = 0; k < count; k++) {
@@ -165,7 +168,8 @@ static void one_jump_over_everything_finds_the_same_moves(void)
     expect_idle();
 
     mpc_at(1600, 1600, 1600);
-    sim_push(&rig, (const uint8_t *)"HKNC", 4); /* nobody comes: the kept ones begin when the reply before them has left */
+    sim_push(&rig, (const uint8_t *)"HKNC",
+             4); /* nobody comes: the kept ones begin when the reply before them has left */
     sim_jump(&rig, 60000000);
     sim_pump(&rig);
     expect_cr(60000000);
@@ -202,8 +206,8 @@ static void a_late_caller_gets_the_newest_streamed_position_only(void)
 
 static void pieces_of_any_size_are_the_same(void)
 {
-    static const uint8_t session[] = {'O', 'S', 15, 64, 0, 0, 0, 3, 0, 0, 0, 13, 0, 0, 0, 'C', '\r', 'M', 3, 0, 0, 0,
-                                      13, 0, 0, 0, 3, 0, 0, 0, 0xEE, 'K', 'I', 2, 'I', 9, 'U', 'L', 3, 3};
+    static const uint8_t session[] = {'O', 'S', 15, 64, 0, 0, 0, 3, 0, 0, 0,    13,  0,   0, 0,   'C', '\r', 'M', 3, 0,
+                                      0,   0,   13, 0,  0, 0, 3, 0, 0, 0, 0xEE, 'K', 'I', 2, 'I', 9,   'U',  'L', 3, 3};
     size_t count = 0;
     for (size_t piece = 1; piece <= sizeof session; piece++) {
         for (unsigned pump = 0; pump < 2; pump++) {
@@ -232,8 +236,8 @@ static void pieces_of_any_size_are_the_same(void)
 
 static void a_month_of_idle_leaves_no_trace(void)
 {
-    static const uint64_t spans[] = {UINT64_C(0x7FFFFFFF), UINT64_C(0x80000000), UINT64_C(0x80000001), UINT64_C(0xFFFFFFFF),
-                                     UINT64_C(0x100000000), UINT64_C(30) * 24 * 3600 * 1000000};
+    static const uint64_t spans[] = {UINT64_C(0x7FFFFFFF), UINT64_C(0x80000000),  UINT64_C(0x80000001),
+                                     UINT64_C(0xFFFFFFFF), UINT64_C(0x100000000), UINT64_C(30) * 24 * 3600 * 1000000};
     for (unsigned i = 0; i < sizeof spans / sizeof spans[0]; i++) {
         for (unsigned visited = 0; visited < 2; visited++) {
             mpc_at(0, 0, 0);

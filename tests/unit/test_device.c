@@ -49,8 +49,7 @@ static void speeds_of_straight_lines_are_the_printed_ones(void)
         const bool mpc = stage >= DR_STAGE_MPC_MP225;
         for (uint8_t level = 0; level < 16; level++) {
             const double um_per_s = mpc ? mpc_um_per_s[level] : trio_um_per_s[level];
-            TEST_ASSERT_EQUAL_UINT32((uint32_t)(um_per_s * 64.0),
-                                     dr_speed_quanta_per_s((dr_stage_id)stage, level));
+            TEST_ASSERT_EQUAL_UINT32((uint32_t)(um_per_s * 64.0), dr_speed_quanta_per_s((dr_stage_id)stage, level));
             /* notes 11 and 12, and the column "% of Max." */
             const double most = mpc ? 1300.0 : 5000.0;
             TEST_ASSERT_TRUE(um_per_s == most / 16.0 * (level + 1.0));
@@ -65,8 +64,8 @@ static void full_speeds_are_those_of_the_stages(void)
         uint32_t mm_per_s;
     } full[] = {
         {DR_STAGE_TRIO_MP845, 5}, {DR_STAGE_TRIO_MP865, 5}, {DR_STAGE_TRIO_MP285, 5}, /* [T note 11] */
-        {DR_STAGE_TRIO_MP265, 5},
-        {DR_STAGE_MPC_MP225, 3},  {DR_STAGE_MPC_MP265, 3},  {DR_STAGE_MPC_MP845, 3},  /* [M table 8] */
+        {DR_STAGE_TRIO_MP265, 5}, {DR_STAGE_MPC_MP225, 3},  {DR_STAGE_MPC_MP265, 3},
+        {DR_STAGE_MPC_MP845, 3}, /* [M table 8] */
         {DR_STAGE_MPC_MP865, 3},  {DR_STAGE_MPC_MP285, 5},  {DR_STAGE_MPC_MT800, 5},
         {DR_STAGE_MPC_MOM, 5},
     };
@@ -96,7 +95,7 @@ static const struct {
     double um_per_step;
     double steps_per_um; /* as printed */
     double mm[3];
-    uint32_t steps[3];   /* as printed, but for [M table 7], which is wrong: [P] */
+    uint32_t steps[3]; /* as printed, but for [M table 7], which is wrong: [P] */
 } stages[] = {
     {DR_STAGE_TRIO_MP845, DR_TRIO, 0.09375, 10.66666666667, {25, 25, 25}, {266667, 266667, 266667}},
     {DR_STAGE_TRIO_MP865, DR_TRIO, 0.09375, 10.66666666667, {50, 12.5, 25}, {533333, 133333, 266667}},
@@ -160,12 +159,14 @@ static void there_is_no_other_stage(void)
     TEST_ASSERT_FALSE(dr_stage_get(DR_STAGE_NONE, &stage));
     TEST_ASSERT_FALSE(dr_stage_get(DR_STAGES, &stage));
     TEST_ASSERT_FALSE(dr_stage_get((dr_stage_id)255, &stage));
+    TEST_ASSERT_NOT_EQUAL(DR_FIT_YES, dr_stage_fits(DR_STAGES, DR_MPC, 0x321, 1));
+    TEST_ASSERT_EQUAL_UINT32(0, dr_speed_quanta_per_s(DR_STAGE_NONE, DR_SPEED_FULL)); /* it does not move */
 }
 
 static void stages_fit_by_controller_firmware_and_port(void)
 {
-    static const uint16_t firmware[] = {0x100, 0x103, 0x105, 0x106, 0x262, 0x299, 0x300, 0x312, 0x313,
-                                        0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x320, 0x321, 0x322, 0x9999};
+    static const uint16_t firmware[] = {0x100, 0x103, 0x105, 0x106, 0x262, 0x299, 0x300, 0x312, 0x313, 0x314,
+                                        0x315, 0x316, 0x317, 0x318, 0x319, 0x320, 0x321, 0x322, 0x9999};
     for (uint8_t id = DR_STAGE_TRIO_MP845; id < DR_STAGES; id++) {
         const dr_kind home = id >= DR_STAGE_MPC_MP225 ? DR_MPC : DR_TRIO;
         for (size_t f = 0; f < COUNT(firmware); f++) {
@@ -290,8 +291,8 @@ static const struct {
     size_t count;
 } tables[] = {{DR_TRIO, trio_commands, COUNT(trio_commands)}, {DR_MPC, mpc_commands, COUNT(mpc_commands)}};
 
-static const uint16_t firmware[] = {0x100, 0x102, 0x103, 0x104, 0x105, 0x106, 0x200, 0x261, 0x262, 0x299,
-                                    0x300, 0x312, 0x313, 0x316, 0x319, 0x321, 0x9999};
+static const uint16_t firmware[] = {0x100, 0x102, 0x103, 0x104, 0x105, 0x106, 0x200, 0x261, 0x262,
+                                    0x299, 0x300, 0x312, 0x313, 0x316, 0x319, 0x321, 0x9999};
 
 static const expected *look_up(size_t table, uint16_t version, int code, int op)
 {
@@ -370,8 +371,8 @@ static void rows_come_in_turn_and_end(void)
 
 static void constants_are_those_of_the_manuals(void)
 {
-    TEST_ASSERT_EQUAL_UINT32(57600, DR_BAUD_TRIO);   /* [T table 3] */
-    TEST_ASSERT_EQUAL_UINT32(128000, DR_BAUD_MPC);   /* [M table 5] */
+    TEST_ASSERT_EQUAL_UINT32(57600, DR_BAUD_TRIO); /* [T table 3] */
+    TEST_ASSERT_EQUAL_UINT32(128000, DR_BAUD_MPC); /* [M table 5] */
     TEST_ASSERT_EQUAL(13, DR_CR);
     TEST_ASSERT_EQUAL('E', DR_NO_SUCH_DRIVE);
     TEST_ASSERT_EQUAL_HEX16(0x0312, DR_FIRMWARE_TRIO);

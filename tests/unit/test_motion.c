@@ -46,7 +46,8 @@ static void check_position(const dr_leg *leg, unsigned axis, uint32_t elapsed, u
         TEST_ASSERT_EQUAL_UINT32(leg->to[axis], at);
         return;
     }
-    const uint64_t gone = leg->to[axis] >= leg->from[axis] ? (uint64_t)at - leg->from[axis] : (uint64_t)leg->from[axis] - at;
+    const uint64_t gone =
+        leg->to[axis] >= leg->from[axis] ? (uint64_t)at - leg->from[axis] : (uint64_t)leg->from[axis] - at;
     const uint64_t share = (uint64_t)way(leg, axis) * elapsed;
     TEST_ASSERT_TRUE(gone * lasts <= share);
     TEST_ASSERT_TRUE((gone + 1) * lasts > share);

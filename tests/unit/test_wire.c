@@ -124,10 +124,17 @@ static void a_request_that_the_firmware_lacks_is_not_written(void)
         uint16_t firmware;
         dr_op op;
     } absent[] = {
-        {DR_TRIO, 0x261, DR_OP_TRIO_RECALIBRATE}, {DR_TRIO, 0x312, DR_OP_MPC_HOME}, {DR_MPC, 0x321, DR_OP_TRIO_HOME},
-        {DR_MPC, 0x299, DR_OP_MPC_LINE}, {DR_MPC, 0x321, DR_OP_MPC_COUNT}, {DR_MPC, 0x299, DR_OP_MPC_DRIVES},
-        {DR_MPC, 0x104, DR_OP_MPC_CENTRE}, {DR_MPC, 0x103, DR_OP_MPC_CALIBRATE}, {DR_MPC, 0x299, DR_OP_MPC_STREAM_ON},
-        {DR_MPC, 0x321, DR_OP_NONE}, {DR_MPC, 0x321, DR_OPS},
+        {DR_TRIO, 0x261, DR_OP_TRIO_RECALIBRATE},
+        {DR_TRIO, 0x312, DR_OP_MPC_HOME},
+        {DR_MPC, 0x321, DR_OP_TRIO_HOME},
+        {DR_MPC, 0x299, DR_OP_MPC_LINE},
+        {DR_MPC, 0x321, DR_OP_MPC_COUNT},
+        {DR_MPC, 0x299, DR_OP_MPC_DRIVES},
+        {DR_MPC, 0x104, DR_OP_MPC_CENTRE},
+        {DR_MPC, 0x103, DR_OP_MPC_CALIBRATE},
+        {DR_MPC, 0x299, DR_OP_MPC_STREAM_ON},
+        {DR_MPC, 0x321, DR_OP_NONE},
+        {DR_MPC, 0x321, DR_OPS},
     };
     for (size_t i = 0; i < COUNT(absent); i++) {
         dr_request request = {0};
@@ -141,7 +148,10 @@ static void a_request_that_the_firmware_lacks_is_not_written(void)
 static void only_x_y_and_z_are_commands_of_one_axis(void)
 {
     for (int op = DR_OP_NONE; op < DR_OPS; op++) {
-        const uint8_t axis = op == DR_OP_TRIO_X ? DR_X : op == DR_OP_TRIO_Y ? DR_Y : op == DR_OP_TRIO_Z ? DR_Z : DR_AXES;
+        const uint8_t axis = op == DR_OP_TRIO_X   ? DR_X
+                             : op == DR_OP_TRIO_Y ? DR_Y
+                             : op == DR_OP_TRIO_Z ? DR_Z
+                                                  : DR_AXES;
         TEST_ASSERT_EQUAL(axis, dr_wire_axis((dr_op)op));
     }
 }
@@ -210,7 +220,8 @@ static void every_byte_value_is_data_inside_a_frame(void)
             dr_framer_reset(&framer);
             TEST_ASSERT_EQUAL(DR_FRAMED_PART, dr_framer_push(&framer, kinds[kind], 0x321, 'S', &command));
             for (int k = 0; k < 12; k++) {
-                TEST_ASSERT_EQUAL(DR_FRAMED_PART, dr_framer_push(&framer, kinds[kind], 0x321, (uint8_t)value, &command));
+                TEST_ASSERT_EQUAL(DR_FRAMED_PART,
+                                  dr_framer_push(&framer, kinds[kind], 0x321, (uint8_t)value, &command));
             }
             TEST_ASSERT_EQUAL(DR_FRAMED_WHOLE, dr_framer_push(&framer, kinds[kind], 0x321, (uint8_t)value, &command));
             const dr_request request = dr_wire_get_request(&command, framer.bytes);
@@ -369,20 +380,20 @@ static void a_reply_of_another_length_or_without_cr_is_refused(void)
 static void a_reply_that_no_controller_sends_is_refused(void)
 {
     static const reply_vector absurd[] = {
-        {DR_TRIO, 0x312, 'c', {0}, {XYZ, 91, 0x0D}, 14},            /* an angle above 90 */
+        {DR_TRIO, 0x312, 'c', {0}, {XYZ, 91, 0x0D}, 14}, /* an angle above 90 */
         {DR_TRIO, 0x312, 'c', {0}, {XYZ, 255, 0x0D}, 14},
-        {DR_MPC, 0x200, 'A', {0}, {0, 0x0D}, 2},                    /* none connected: nothing is answered */
+        {DR_MPC, 0x200, 'A', {0}, {0, 0x0D}, 2}, /* none connected: nothing is answered */
         {DR_MPC, 0x200, 'A', {0}, {5, 0x0D}, 2},
         {DR_MPC, 0x321, 'U', {0}, {0, 0, 0, 0, 0, 0x0D}, 6},
         {DR_MPC, 0x321, 'U', {0}, {5, 1, 1, 1, 1, 0x0D}, 6},
-        {DR_MPC, 0x321, 'U', {0}, {1, 2, 0, 0, 0, 0x0D}, 6},        /* a flag is 0 or 1 */
+        {DR_MPC, 0x321, 'U', {0}, {1, 2, 0, 0, 0, 0x0D}, 6}, /* a flag is 0 or 1 */
         {DR_MPC, 0x321, 'U', {0}, {1, 1, 0, 0, 9, 0x0D}, 6},
-        {DR_MPC, 0x321, 'U', {0}, {2, 1, 0, 0, 0, 0x0D}, 6},        /* the count is that of the flags */
-        {DR_MPC, 0x299, 'K', {0}, {0, 0x0D}, 2},                    /* drives are 1 to 4 */
+        {DR_MPC, 0x321, 'U', {0}, {2, 1, 0, 0, 0, 0x0D}, 6}, /* the count is that of the flags */
+        {DR_MPC, 0x299, 'K', {0}, {0, 0x0D}, 2},             /* drives are 1 to 4 */
         {DR_MPC, 0x299, 'K', {0}, {5, 0x0D}, 2},
         {DR_MPC, 0x321, 'K', {0}, {0, 0x21, 0x03, 0x0D}, 4},
         {DR_MPC, 0x321, 'K', {0}, {'1', 0x21, 0x03, 0x0D}, 4},
-        {DR_MPC, 0x321, 'K', {0}, {1, 0x2A, 0x03, 0x0D}, 4},        /* not decimal */
+        {DR_MPC, 0x321, 'K', {0}, {1, 0x2A, 0x03, 0x0D}, 4}, /* not decimal */
         {DR_MPC, 0x321, 'K', {0}, {1, 0xA2, 0x03, 0x0D}, 4},
         {DR_MPC, 0x321, 'K', {0}, {1, 0x21, 0x0F, 0x0D}, 4},
         {DR_MPC, 0x321, 'K', {0}, {1, 0x21, 0xF0, 0x0D}, 4},
