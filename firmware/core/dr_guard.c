@@ -42,6 +42,7 @@ typedef enum {
 #define PROOF_RETRY_US MS(500) /* once that has failed */
 #define REPEAT_STOP_US MS(150)
 #define STOPS_MAX 3u
+#define HOST_STOPS_MAX 15u             /* known clients send as many running */
 #define SMALL_MOVE_US MS(100) /* 15 microsteps at the slowest speed take 15 ms */
 #define SMALL_MOVE_STEPS 16u  /* an MPC-200 ignores shorter moves, without a CR ([P], small-move-silent) */
 #define CALIBRATION_US MS(60000)
@@ -967,7 +968,9 @@ static void pass_stop(dr_guard *g, dr_us now, const dr_command *command)
 /* 0x03 from the host while something is under way. */
 static void stop_by_host(dr_guard *g, dr_us now)
 {
-    if (g->task == TASK_STOP) {
+    if (g->task == TASK_STOP && g->stop_owed >= HOST_STOPS_MAX && is_running(g, DR_TIMER_PROOF)) {
+        drop(g, now, DR_REASON_BUSY, CTRL_C); /* their answers would keep rest from being proved */
+    } else if (g->task == TASK_STOP) {
         if (g->stop_owed < UINT8_MAX)
             g->stop_owed++;
         send_stop(g, now, DR_STOP_HOST);

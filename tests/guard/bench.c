@@ -30,6 +30,13 @@ static bool is_less_safe(uint8_t before, uint8_t after)
            ((before == DR_GUARD_DISARMED || before == DR_GUARD_LOCKED) && armed);
 }
 
+/* Nothing is under way that the host may still get an answer to. */
+static bool is_quiet(uint8_t state)
+{
+    return state != DR_GUARD_CHECKING && state != DR_GUARD_MOVING_S && state != DR_GUARD_MOVING_U &&
+           state != DR_GUARD_STOPPING;
+}
+
 static void monitor_record(const dr_record *record)
 {
     if (record->event == DR_EVENT_REFUSED) {
@@ -37,7 +44,7 @@ static void monitor_record(const dr_record *record)
         rig.frames_refused++;
         dr_command command;
         if (dr_command_find((dr_kind)rig.limits.kind, rig.limits.firmware, record->bytes[0], &command) &&
-            (command.is & DR_IS_MOTION) != 0 && record->code != DR_REASON_BUSY && record->code != DR_REASON_CANCELLED)
+            (command.is & DR_IS_MOTION) != 0 && record->code != DR_REASON_CANCELLED && is_quiet(record->after))
             rig.refused_open = true;
     }
     if (record->event == DR_EVENT_ALLOWED || record->event == DR_EVENT_STOP)
