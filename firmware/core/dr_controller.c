@@ -1,12 +1,12 @@
 #include "dr_controller.h"
 
-#define BOOT_US DR_US_PER_S                    /* "ready about one second after power-on" [O] */
-#define SMALL_MOVE_STEPS 16u                   /* quirk small-move-silent [P] */
-#define CALIBRATION_OUT_UM 1000u               /* where a TRIO's calibration ends on each axis [O] */
-#define CALIBRATION_BEYOND_UM 250u             /* how far an MPC's calibration goes beyond 0 (chosen [P]) */
-#define LAST_POSITIVE UINT32_C(0x7FFFFFFF)     /* quirk endless-negative: what lies above is "negative" */
-#define MODE_LAST 9u                           /* [M table 9, 'L'] */
-#define STOPPED_BY_HAND 0x80u                  /* in out_op, beside the dr_op of the move whose CR it is */
+#define BOOT_US DR_US_PER_S                /* "ready about one second after power-on" [O] */
+#define SMALL_MOVE_STEPS 16u               /* quirk small-move-silent [P] */
+#define CALIBRATION_OUT_UM 1000u           /* where a TRIO's calibration ends on each axis [O] */
+#define CALIBRATION_BEYOND_UM 250u         /* how far an MPC's calibration goes beyond 0 (chosen [P]) */
+#define LAST_POSITIVE UINT32_C(0x7FFFFFFF) /* quirk endless-negative: what lies above is "negative" */
+#define MODE_LAST 9u                       /* [M table 9, 'L'] */
+#define STOPPED_BY_HAND 0x80u              /* in out_op, beside the dr_op of the move whose CR it is */
 
 /* The most that can happen within one call without a byte leaving: every kept command may end without an answer, in up to
  * LEGS legs, each after a streamed frame. */
@@ -114,7 +114,8 @@ static void note_value(const dr_controller *c, dr_us when, dr_note_kind what, ui
 static void note_point(const dr_controller *c, dr_us when, dr_note_kind what, uint32_t value, const uint32_t *steps)
 {
     if (c->notes != NULL)
-        put_note(c, &(dr_note){when, (uint8_t)what, c->move_op, c->active, 0, {0}, value, {steps[0], steps[1], steps[2]}});
+        put_note(c,
+                 &(dr_note){when, (uint8_t)what, c->move_op, c->active, 0, {0}, value, {steps[0], steps[1], steps[2]}});
 }
 
 static void note_bytes(const dr_controller *c, dr_us when, dr_note_kind what, uint8_t op, const uint8_t *bytes,
@@ -321,7 +322,8 @@ static void halt(dr_controller *c, dr_us now)
 }
 
 /* Begins a move to target[], already within reach of the drive. */
-static void begin_move(dr_controller *c, dr_us when, uint8_t op, uint8_t level, const uint32_t target[DR_AXES], bool answers)
+static void begin_move(dr_controller *c, dr_us when, uint8_t op, uint8_t level, const uint32_t target[DR_AXES],
+                       bool answers)
 {
     c->move_op = op;
     c->move_leg = 0;
@@ -635,8 +637,7 @@ static bool settle_one(dr_controller *c, dr_us now, dr_us *before)
 static void settle(dr_controller *c, dr_us now)
 {
     dr_us before = now;
-    for (uint16_t i = 0; i < EVENTS_MAX && settle_one(c, now, &before); i++) {
-    }
+    for (uint16_t i = 0; i < EVENTS_MAX && settle_one(c, now, &before); i++) {}
 }
 
 bool dr_controller_due(const dr_controller *c, dr_us *when)
@@ -833,6 +834,12 @@ static void power_on(dr_controller *c, dr_us now)
     }
 }
 
+static bool can_connect(const dr_controller *c, const dr_hand *hand)
+{
+    return hand->stage == DR_STAGE_NONE ||
+           dr_stage_fits((dr_stage_id)hand->stage, kind_of(c), c->firmware, (uint8_t)(hand->drive + 1u)) == DR_FIT_YES;
+}
+
 static void connect(dr_controller *c, dr_us now, const dr_hand *hand)
 {
     dr_drive *drive = &c->drives[hand->drive];
@@ -885,7 +892,7 @@ bool dr_controller_poke(dr_controller *c, dr_us now, const dr_hand *hand)
         power_on(c, now);
         return true;
     case DR_HAND_CONNECT:
-        if (hand->drive >= c->drive_count)
+        if (hand->drive >= c->drive_count || !can_connect(c, hand))
             return false;
         connect(c, now, hand);
         return true;
@@ -953,8 +960,9 @@ static void begin_by_hand(dr_controller *c, dr_us now, dr_op op)
 {
     dr_command command;
     if (!dr_command_for(kind_of(c), c->firmware, op, &command))
-        (void)dr_command_for(kind_of(c), c->firmware, DR_OP_MPC_CENTRE, &command); /* no calibration yet [M table 9, 'N'] */
-    c->move_is_paused = false; /* a move that ^C paused is dropped */
+        (void)dr_command_for(kind_of(c), c->firmware, DR_OP_MPC_CENTRE,
+                             &command); /* no calibration yet [M table 9, 'N'] */
+    c->move_is_paused = false;          /* a move that ^C paused is dropped */
     execute(c, now, &command, &command.code);
     c->move_answers = false;
 }

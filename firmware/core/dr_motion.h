@@ -14,7 +14,7 @@ extern "C" {
 
 typedef struct {
     uint32_t from[DR_AXES], to[DR_AXES];
-    dr_us lasts_us[DR_AXES];         /* each axis is there after so long; 0: it stands still */
+    dr_us lasts_us[DR_AXES]; /* each axis is there after so long; 0: it stands still */
 } dr_leg;
 
 /* A straight line: all axes start and end together; the axis with the longest way has the given speed. */

@@ -18,9 +18,9 @@ extern "C" {
 /* -- Requests ------------------------------------------------------------------------------------------------------ */
 
 typedef struct {
-    uint8_t op;                      /* dr_op */
-    uint8_t value;                   /* speed level, drive, angle (degrees) or mode; 0 where the command has none */
-    uint32_t steps[DR_AXES];         /* target; an axis command fills its own axis only */
+    uint8_t op;              /* dr_op */
+    uint8_t value;           /* speed level, drive, angle (degrees) or mode; 0 where the command has none */
+    uint32_t steps[DR_AXES]; /* target; an axis command fills its own axis only */
 } dr_request;
 
 /* The axis of a one-axis command, DR_AXES for any other. */
@@ -39,10 +39,10 @@ typedef struct {
 } dr_framer;
 
 typedef enum {
-    DR_FRAMED_PART,                  /* taken; the frame is not whole yet */
-    DR_FRAMED_WHOLE,                 /* bytes[0..want) is a frame; the next byte starts a new one */
-    DR_FRAMED_FILLER,                /* CR or LF between frames: swallowed */
-    DR_FRAMED_UNKNOWN                /* no command of this controller and firmware: dropped */
+    DR_FRAMED_PART,   /* taken; the frame is not whole yet */
+    DR_FRAMED_WHOLE,  /* bytes[0..want) is a frame; the next byte starts a new one */
+    DR_FRAMED_FILLER, /* CR or LF between frames: swallowed */
+    DR_FRAMED_UNKNOWN /* no command of this controller and firmware: dropped */
 } dr_framed;
 
 void dr_framer_reset(dr_framer *framer);
@@ -52,9 +52,9 @@ dr_framed dr_framer_push(dr_framer *framer, dr_kind kind, uint16_t firmware, uin
 /* -- Replies ------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    uint8_t value;                   /* drive or 'E' (MPC), angle in degrees (TRIO), number of drives */
-    uint8_t connected;               /* DR_OP_MPC_DRIVES: bit 0 is port 1 */
-    uint16_t firmware;               /* DR_OP_MPC_ACTIVE from 3.00 */
+    uint8_t value;     /* drive or 'E' (MPC), angle in degrees (TRIO), number of drives */
+    uint8_t connected; /* DR_OP_MPC_DRIVES: bit 0 is port 1 */
+    uint16_t firmware; /* DR_OP_MPC_ACTIVE from 3.00 */
     uint32_t steps[DR_AXES];
 } dr_reply;
 
