@@ -179,3 +179,9 @@ int dryrig_link_open(dryrig_link *out, const char *port, unsigned baud, char *wh
     }
     return is_pty(&is) ? link_pty_open(out, path, baud, why, room) : link_serial_open(out, path, baud, why, room);
 }
+
+int link_descriptor(const dryrig_link *link)
+{
+    const int fd = link_pty_descriptor(link);
+    return fd >= 0 ? fd : link_serial_descriptor(link);
+}

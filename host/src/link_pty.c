@@ -61,6 +61,8 @@ static int pty_purge(void *context) { return ioctl(fd_of(context), TCFLSH, TCIFL
 
 static void pty_close(void *context) { (void)close(fd_of(context)); }
 
+int link_pty_descriptor(const dryrig_link *link) { return link->close == pty_close ? fd_of(link->context) : -1; }
+
 static int set_raw(int fd, unsigned baud)
 {
     struct termios2 line;

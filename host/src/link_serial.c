@@ -29,6 +29,12 @@ static void serial_close(void *context)
     sp_free_port(context);
 }
 
+int link_serial_descriptor(const dryrig_link *link)
+{
+    int fd = -1;
+    return link->close == serial_close && sp_get_port_handle(link->context, &fd) == SP_OK ? fd : -1;
+}
+
 static int failed(const char *path, const char *doing, char *why, size_t room)
 {
     char *message = sp_last_error_message();

@@ -343,13 +343,14 @@ static int run(dryrig *d, const plan *p, dryrig_position *end)
 
 /* -- Asking for it ------------------------------------------------------------------------------------------------------ */
 
-/* What a public function wants. */
+/* What a public function wants. Targets are copies: a caller may pass one place as target and as end. */
 typedef struct {
     dr_op op;
-    const double *um;     /* a target in microns, or */
-    const int32_t *steps; /* in steps, or neither */
-    size_t axis;          /* of which only this axis; DR_AXES: all */
-    int level;            /* of a straight line */
+    enum { NO_TARGET, IN_UM, IN_STEPS } target;
+    double um[DR_AXES];
+    int32_t steps[DR_AXES];
+    size_t axis; /* the target's only axis; DR_AXES: all */
+    int level;   /* of a straight line */
     bool stream;
     dryrig_order order;
 } wish;
@@ -357,16 +358,9 @@ typedef struct {
 /* The target, as far as it can be known without asking where the stage is; checked. */
 static int take_target(dryrig *d, const wish *want, dr_stage_id stage, plan *p)
 {
-    int32_t steps[DR_AXES] = {0, 0, 0};
-    double um[DR_AXES] = {0, 0, 0};
-    int result = DRYRIG_OK;
-    for (size_t axis = 0; axis < DR_AXES; axis++) {
-        const bool wanted = want->axis == DR_AXES || want->axis == axis;
-        um[axis] = wanted && want->um != NULL ? want->um[axis] : 0;
-        steps[axis] = wanted && want->steps != NULL ? want->steps[axis] : 0;
-    }
-    if (want->um != NULL)
-        result = convert_um(d, stage, um, steps);
+    int32_t steps[DR_AXES];
+    memcpy(steps, want->steps, sizeof steps);
+    int result = want->target == IN_UM ? convert_um(d, stage, want->um, steps) : DRYRIG_OK;
     if (result == DRYRIG_OK)
         result = check_target(d, stage, steps);
     for (size_t axis = 0; result == DRYRIG_OK && axis < DR_AXES; axis++)
@@ -381,14 +375,14 @@ static int refuse_early(dryrig *d, const wish *want)
         return fail(d, DRYRIG_ERR_RANGE, "speed level %d: there are 0 (slowest) to 15", want->level);
     if (want->stream && d->kind == DR_TRIO)
         return fail(d, DRYRIG_ERR_UNSUPPORTED, "a TRIO streams no positions");
-    if (want->um == NULL && want->steps == NULL)
+    if (want->target == NO_TARGET)
         return DRYRIG_OK;
     const bool any = d->kind == DR_MPC && d->drive == 0;
     int result = DRYRIG_OK;
     for (int drive = any ? 1 : d->drive; drive <= (any ? DRYRIG_DRIVES : d->drive); drive++) {
         plan unused;
         const dr_stage_id stage = stage_of(d, drive);
-        if (any && want->um != NULL && stage == DR_STAGE_NONE && (result < 0 || drive < DRYRIG_DRIVES))
+        if (any && want->target == IN_UM && stage == DR_STAGE_NONE && (result < 0 || drive < DRYRIG_DRIVES))
             continue; /* the others' stages may be known */
         result = take_target(d, want, stage, &unused);
         if (result == DRYRIG_OK)
@@ -422,7 +416,7 @@ static int find_start(dryrig *d, plan *p)
 
 static int make_plan(dryrig *d, const wish *want, plan *p)
 {
-    const bool has_target = want->um != NULL || want->steps != NULL;
+    const bool has_target = want->target != NO_TARGET;
     p->request.op = (uint8_t)want->op;
     p->request.value = (uint8_t)want->level;
     p->stream = want->stream;
@@ -535,70 +529,88 @@ static int refuse(dryrig *d, int error, const char *text)
     return result < 0 ? result : leave(d, fail(d, error, "%s", text));
 }
 
-static int move_to(dryrig *d, const double *um, const int32_t *steps, dryrig_order order, dryrig_position *end)
+static wish wish_for(dr_op op, const double *um, const int32_t *steps)
 {
-    if ((um == NULL) == (steps == NULL) || order < DRYRIG_ORDER_AUTO || order > DRYRIG_ORDER_WORK)
+    wish want;
+    memset(&want, 0, sizeof want);
+    want.op = op;
+    want.axis = DR_AXES;
+    want.target = um != NULL ? IN_UM : steps != NULL ? IN_STEPS : NO_TARGET;
+    for (size_t axis = 0; axis < DR_AXES; axis++) {
+        want.um[axis] = um != NULL ? um[axis] : 0;
+        want.steps[axis] = steps != NULL ? steps[axis] : 0;
+    }
+    return want;
+}
+
+static int move_to(dryrig *d, wish want, dryrig_order order, dryrig_position *end)
+{
+    if (want.target == NO_TARGET || order < DRYRIG_ORDER_AUTO || order > DRYRIG_ORDER_WORK)
         return refuse(d, DRYRIG_ERR_ARGUMENT, "no target, or no such order");
-    if (d != NULL && d->kind == DR_MPC && order != DRYRIG_ORDER_AUTO)
+    if (want.op == DR_OP_MPC_MOVE && order != DRYRIG_ORDER_AUTO)
         return refuse(d, DRYRIG_ERR_UNSUPPORTED, "an MPC-200 moves all axes at once: there is no order to choose");
-    const wish want = {op_for(d, DR_OP_TRIO_WORK_TO, DR_OP_MPC_MOVE), um, steps, DR_AXES, 0, false, order};
+    want.order = order;
     return move(d, &want, end);
 }
 
 int dryrig_move_um(dryrig *d, const double target_um[DRYRIG_AXES], dryrig_order order, dryrig_position *end)
 {
-    return move_to(d, target_um, NULL, order, end);
+    return move_to(d, wish_for(op_for(d, DR_OP_TRIO_WORK_TO, DR_OP_MPC_MOVE), target_um, NULL), order, end);
 }
 
 int dryrig_move_steps(dryrig *d, const int32_t target_steps[DRYRIG_AXES], dryrig_order order, dryrig_position *end)
 {
-    return move_to(d, NULL, target_steps, order, end);
+    return move_to(d, wish_for(op_for(d, DR_OP_TRIO_WORK_TO, DR_OP_MPC_MOVE), NULL, target_steps), order, end);
 }
 
-static int line_to(dryrig *d, const double *um, const int32_t *steps, int level, bool stream, dryrig_position *end)
+static int line_to(dryrig *d, wish want, int level, bool stream, dryrig_position *end)
 {
-    if ((um == NULL) == (steps == NULL))
+    if (want.target == NO_TARGET)
         return refuse(d, DRYRIG_ERR_ARGUMENT, "no target");
-    const wish want = {
-        op_for(d, DR_OP_TRIO_LINE, DR_OP_MPC_LINE), um, steps, DR_AXES, level, stream, DRYRIG_ORDER_AUTO};
+    want.level = level;
+    want.stream = stream;
     return move(d, &want, end);
 }
 
 int dryrig_line_um(dryrig *d, const double target_um[DRYRIG_AXES], int speed_level, bool stream, dryrig_position *end)
 {
-    return line_to(d, target_um, NULL, speed_level, stream, end);
+    return line_to(d, wish_for(op_for(d, DR_OP_TRIO_LINE, DR_OP_MPC_LINE), target_um, NULL), speed_level, stream, end);
 }
 
 int dryrig_line_steps(dryrig *d, const int32_t target_steps[DRYRIG_AXES], int speed_level, bool stream,
                       dryrig_position *end)
 {
-    return line_to(d, NULL, target_steps, speed_level, stream, end);
+    return line_to(d, wish_for(op_for(d, DR_OP_TRIO_LINE, DR_OP_MPC_LINE), NULL, target_steps), speed_level, stream,
+                   end);
 }
 
-static int axis_to(dryrig *d, int axis, const double *um, const int32_t *steps, dryrig_position *end)
+static int axis_to(dryrig *d, int axis, double um, int32_t steps, bool in_um, dryrig_position *end)
 {
+    double um_of[DR_AXES] = {0, 0, 0};
+    int32_t steps_of[DR_AXES] = {0, 0, 0};
     if (axis < DRYRIG_X || axis > DRYRIG_Z)
         return refuse(d, DRYRIG_ERR_ARGUMENT, "no such axis");
-    const wish want = {
-        op_for(d, (dr_op)(DR_OP_TRIO_X + axis), DR_OP_MPC_MOVE), um, steps, (size_t)axis, 0, false, DRYRIG_ORDER_AUTO};
+    um_of[axis] = um;
+    steps_of[axis] = steps;
+    wish want = wish_for(op_for(d, (dr_op)(DR_OP_TRIO_X + axis), DR_OP_MPC_MOVE), in_um ? um_of : NULL,
+                         in_um ? NULL : steps_of);
+    want.axis = (size_t)axis;
     return move(d, &want, end);
 }
 
 int dryrig_axis_um(dryrig *d, int axis, double target_um, dryrig_position *end)
 {
-    const double um[DR_AXES] = {target_um, target_um, target_um};
-    return axis_to(d, axis, um, NULL, end);
+    return axis_to(d, axis, target_um, 0, true, end);
 }
 
 int dryrig_axis_steps(dryrig *d, int axis, int32_t target_steps, dryrig_position *end)
 {
-    const int32_t steps[DR_AXES] = {target_steps, target_steps, target_steps};
-    return axis_to(d, axis, NULL, steps, end);
+    return axis_to(d, axis, 0, target_steps, false, end);
 }
 
 static int move_by_name(dryrig *d, dr_op trio, dr_op mpc, dryrig_position *end)
 {
-    const wish want = {op_for(d, trio, mpc), NULL, NULL, DR_AXES, 0, false, DRYRIG_ORDER_AUTO};
+    const wish want = wish_for(op_for(d, trio, mpc), NULL, NULL);
     return move(d, &want, end);
 }
 

@@ -226,6 +226,20 @@ static void motions_on_every_stage(void)
     }
 }
 
+/* One place as target and as end: a relative move. */
+static void a_target_may_be_the_place_for_the_end(void)
+{
+    dryrig_position p;
+    begin(DR_TRIO);
+    OK(dryrig_get_position(d, &p));
+    p.steps[DRYRIG_Z] += 320;
+    OK(dryrig_move_steps(d, p.steps, DRYRIG_ORDER_AUTO, &p));
+    check_at(&p, 10667, 10667, 10987);
+    p.um[DRYRIG_X] += 93.75;
+    OK(dryrig_line_um(d, p.um, 5, false, &p));
+    check_at(&p, 11667, 10667, 10987);
+}
+
 /* -- Streaming ---------------------------------------------------------------------------------------------------------- */
 
 static struct {
@@ -865,6 +879,7 @@ int main(void)
     RUN_TEST(every_command_of_the_mpc);
     RUN_TEST(old_firmware);
     RUN_TEST(motions_on_every_stage);
+    RUN_TEST(a_target_may_be_the_place_for_the_end);
     RUN_TEST(a_line_streams_every_micron);
     RUN_TEST(a_callback_may_interrupt);
     RUN_TEST(streaming_left_on);
