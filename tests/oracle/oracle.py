@@ -339,7 +339,7 @@ def report(driver, seed, run):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('driver')
-    parser.add_argument('--count', type=int, default=5000)
+    parser.add_argument('--count', type=int, default=3000)
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--show', type=int, help='print one scenario and its transcript, and run nothing')
     parser.add_argument('--most', type=int, default=5, help='stop after so many failures')
