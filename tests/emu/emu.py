@@ -55,6 +55,13 @@ class Emulator:
         self.out, self.err = (stream.decode() if stream else "" for stream in self.process.communicate(timeout=LIMIT_S))
         return self.process.returncode
 
+    def wait_for(self, words):
+        """Until a line of stderr (of --trace -) says so. Returns the line."""
+        for line in self.process.stderr:
+            if words in line:
+                return line.decode()
+        raise AssertionError(f"stderr ended without {words!r}")
+
     def cpu_ticks(self):
         """Processor time so far, in hundredths of a second."""
         with open(f"/proc/{self.process.pid}/stat", encoding="ascii") as file:

@@ -146,12 +146,28 @@ class Pace(unittest.TestCase):
                     self.assertEqual(len(port.ask(b"C", 14)), 14)
                 self.assertGreaterEqual(time.monotonic() - before, 50 * 15 * byte_s)
 
-    def test_speedup_speeds_the_line_too(self):
-        with Emulator("trio", "--speedup", "1000") as e, Port(e.path) as port:
-            before = time.monotonic()
-            for _ in range(1000):
+    def test_speedup_is_how_much_faster_the_controllers_clock_runs(self):
+        with Emulator("trio", "--speedup", "200", "--trace", "-") as e, Port(e.path) as port:
+            def asked_at():
                 self.assertEqual(len(port.ask(b"C", 14)), 14)
-            self.assertLess(time.monotonic() - before, 1000 * 15 * 10 / 57600)  # 2.6 s
+                return float(e.wait_for(b" > 43 ").split()[0])
+            outer = time.monotonic()
+            first = asked_at()
+            inner = time.monotonic()
+            time.sleep(0.05)
+            inner = time.monotonic() - inner
+            second = asked_at()
+            outer = time.monotonic() - outer
+            self.assertGreaterEqual(second - first, 200 * inner)
+            self.assertLessEqual(second - first, 200 * outer)
+
+    def test_a_fast_clock_has_a_fast_line(self):
+        with Emulator("trio", "--speedup", "1000", "--trace", "-") as e, Port(e.path) as port:
+            port.send(b"CR")  # 'R' begins when the reply to 'C' has left, and is itself answered
+            self.assertEqual(len(port.receive(15)), 15)
+            asked = float(e.wait_for(b" > 43 ").split()[0])
+            began = float(e.wait_for(b" - runs to").split()[0])
+            self.assertAlmostEqual(began - asked, 0.002431, delta=0.0000021)  # of the controller's clock
 
     def test_a_stream_that_the_line_cannot_carry_skips_positions(self):
         with Emulator("mpc", "--speedup", "10") as e, Port(e.path) as port:
