@@ -1,0 +1,353 @@
+#define _GNU_SOURCE /* ppoll, inotify, signalfd */
+#include "bridge.h"
+
+#include "link.h" /* the stable name of the host's port */
+
+#include "dr_words.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/inotify.h>
+#include <sys/prctl.h>
+#include <sys/signalfd.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#define S_US UINT64_C(1000000)
+#define TRY_AGAIN_US (S_US / 2)     /* while the controller's port is gone */
+#define CHECK_US S_US               /* memory, while something may move */
+#define STEP_US (UINT64_C(1) << 30) /* the guard tells instants apart up to 2^31 us */
+#define CHUNK 256u
+#define CTRL_C 0x03u
+
+enum { FD_SIGNALS, FD_INOTIFY, FD_HOST, FD_DEVICE, FD_CONTROL, FDS = FD_CONTROL + CONTROL_FDS };
+
+/* -- Time -------------------------------------------------------------------------------------------------------------- */
+
+static uint64_t clock_us(clockid_t id)
+{
+    struct timespec now;
+    (void)clock_gettime(id, &now);
+    return (uint64_t)now.tv_sec * S_US + (uint64_t)now.tv_nsec / 1000u;
+}
+
+dr_us bridge_now(const bridge *b) { return (dr_us)b->now_us; }
+
+/* Time goes on. A guard that was not looked at for very long (a suspended machine) still sees what was due in order. */
+static void advance(bridge *b)
+{
+    const uint64_t now_us = clock_us(CLOCK_MONOTONIC) - b->epoch_us;
+    while (now_us - b->now_us > STEP_US) {
+        b->now_us += STEP_US;
+        (void)dr_guard_self_check(&b->guard, bridge_now(b));
+    }
+    b->now_us = now_us;
+}
+
+/* -- What the guard wants to be done ----------------------------------------------------------------------------------- */
+
+static void keep_records(bridge *b)
+{
+    dr_record record;
+    bool is_kept = true;
+    while (dr_guard_pull_log(&b->guard, &record)) {
+        const uint64_t ago_us = (uint32_t)(bridge_now(b) - record.when);
+        is_kept = journal_add(&b->journal, &b->rig, &record, clock_us(CLOCK_REALTIME) - ago_us);
+    }
+    if (!is_kept && !b->log_said)
+        (void)fprintf(stderr, "dryrig-guard: the log %s cannot be written: %s\n", b->options->log, strerror(errno));
+    if (!is_kept != b->log_said) {
+        b->log_said = !is_kept;
+        dr_guard_input(&b->guard, bridge_now(b), DR_INPUT_LOG_FAILED, !is_kept);
+        while (dr_guard_pull_log(&b->guard, &record)) /* what the input itself has to say; it may fail as well */
+            (void)journal_add(&b->journal, &b->rig, &record, clock_us(CLOCK_REALTIME));
+    }
+}
+
+static void lose_device(bridge *b, const char *why)
+{
+    device_close(&b->device);
+    (void)snprintf(b->device_says, sizeof b->device_says, "%s: %s", b->options->port, why);
+    b->next_try_us = b->now_us + TRY_AGAIN_US;
+    dr_guard_link(&b->guard, bridge_now(b), b->host.opens > 0, false);
+}
+
+static bool is_stop(const uint8_t *bytes, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (bytes[i] != CTRL_C)
+            return false;
+    return true;
+}
+
+static void send_device(bridge *b, const uint8_t *bytes, size_t count)
+{
+    if (b->device.fd >= 0 && !device_write(&b->device, bytes, count))
+        lose_device(b, "it takes no more bytes, or is gone");
+}
+
+/* A stop leaves at once; a reply next; anything else for the controller when its record is kept. */
+void bridge_pump(bridge *b)
+{
+    uint8_t out[CHUNK], in[CHUNK];
+    const size_t out_count = dr_guard_pull_device(&b->guard, bridge_now(b), out, sizeof out);
+    const bool stops = is_stop(out, out_count);
+    if (out_count > 0 && stops)
+        send_device(b, out, out_count);
+    const size_t in_count = dr_guard_pull_host(&b->guard, bridge_now(b), in, sizeof in);
+    if (in_count > 0) {
+        (void)pty_put(&b->host, in, in_count);
+        (void)pty_flush(&b->host);
+    }
+    keep_records(b);
+    if (out_count > 0 && !stops)
+        send_device(b, out, out_count);
+}
+
+/* -- What comes in ----------------------------------------------------------------------------------------------------- */
+
+static void tell_link(bridge *b)
+{
+    dr_guard_link(&b->guard, bridge_now(b), b->host.opens > 0, b->device.fd >= 0);
+    bridge_pump(b);
+}
+
+/* Who has opened and closed the host's port. */
+static void read_hints(bridge *b)
+{
+    char hints[1024];
+    ssize_t length;
+    while ((length = read(b->inotify, hints, sizeof hints)) > 0) {
+        struct inotify_event hint;
+        for (const char *at = hints; at < hints + length; at += sizeof hint + hint.len) {
+            memcpy(&hint, at, sizeof hint);
+            if (hint.wd == b->host.watch)
+                pty_hint(&b->host, hint.mask);
+        }
+    }
+    if (b->host.was_left) { /* even if the next one is there already */
+        dr_guard_link(&b->guard, bridge_now(b), false, b->device.fd >= 0);
+        bridge_pump(b);
+    }
+    pty_look(&b->host);
+    tell_link(b);
+}
+
+static void listen_to_host(bridge *b)
+{
+    uint8_t bytes[CHUNK];
+    if (b->host.opens == 0) /* it was opened a moment ago */
+        read_hints(b);
+    const size_t count = pty_read(&b->host, bytes, sizeof bytes);
+    if (count == 0)
+        return;
+    dr_guard_push_host(&b->guard, bridge_now(b), bytes, count);
+    bridge_pump(b);
+}
+
+static void listen_to_device(bridge *b)
+{
+    uint8_t bytes[CHUNK];
+    const ssize_t count = device_read(&b->device, bytes, sizeof bytes);
+    if (count > 0)
+        dr_guard_push_device(&b->guard, bridge_now(b), bytes, (size_t)count);
+    else if (count < 0)
+        lose_device(b, "it is gone (unplugged?)");
+    if (count != 0)
+        bridge_pump(b);
+}
+
+/* DRYRIG_OK, or a dryrig_error; b->device_says tells why. */
+static int try_device(bridge *b)
+{
+    const int result = device_open(&b->device, &b->rig.limits, b->device_says, sizeof b->device_says);
+    b->next_try_us = b->now_us + TRY_AGAIN_US;
+    if (result == DRYRIG_OK)
+        b->device_says[0] = '\0';
+    return result;
+}
+
+/* -- The loop ---------------------------------------------------------------------------------------------------------- */
+
+static bool may_move(const bridge *b) { return b->was_armed; }
+
+static void sooner(uint64_t *due_us, bool *any, uint64_t when_us)
+{
+    if (!*any || when_us < *due_us)
+        *due_us = when_us;
+    *any = true;
+}
+
+/* When something is to be done by itself. False: never, as things are. */
+static bool next_due(const bridge *b, uint64_t *due_us)
+{
+    bool any = false;
+    dr_us when;
+    uint64_t order_us;
+    if (dr_guard_due(&b->guard, &when)) {
+        const uint32_t left_us = when - bridge_now(b);
+        sooner(due_us, &any, dr_us_before(when, bridge_now(b)) ? b->now_us : b->now_us + left_us);
+    }
+    if (b->device.fd < 0)
+        sooner(due_us, &any, b->next_try_us);
+    if (orders_due(b, &order_us))
+        sooner(due_us, &any, order_us);
+    if (may_move(b))
+        sooner(due_us, &any, b->next_check_us);
+    return any;
+}
+
+static void wait(const bridge *b, struct pollfd *fds)
+{
+    uint64_t due_us = 0;
+    struct timespec left = {0, 0};
+    const bool is_due = next_due(b, &due_us);
+    fds[FD_SIGNALS] = (struct pollfd){b->signals, POLLIN, 0};
+    fds[FD_INOTIFY] = (struct pollfd){b->inotify, POLLIN, 0};
+    fds[FD_HOST] = (struct pollfd){b->host.fd, (short)(POLLIN | (b->host.waiting_count > 0 ? POLLOUT : 0)), 0};
+    fds[FD_DEVICE] = (struct pollfd){b->device.fd, POLLIN, 0};
+    control_watch(&b->control, &fds[FD_CONTROL]);
+    const uint64_t now_us = clock_us(CLOCK_MONOTONIC) - b->epoch_us;
+    if (is_due && due_us > now_us)
+        left = (struct timespec){(time_t)((due_us - now_us) / S_US), (long)((due_us - now_us) % S_US * 1000u)};
+    if (ppoll(fds, FDS, is_due ? &left : NULL, NULL) < 0)
+        for (unsigned i = 0; i < FDS; i++)
+            fds[i].revents = 0;
+}
+
+/* People's orders first: a stop is among them. */
+static void serve(bridge *b, const struct pollfd *fds)
+{
+    advance(b);
+    bridge_pump(b);
+    control_serve(&b->control, &fds[FD_CONTROL], orders_take, b);
+    if (fds[FD_INOTIFY].revents != 0)
+        read_hints(b);
+    if ((fds[FD_HOST].revents & POLLIN) != 0)
+        listen_to_host(b);
+    if ((fds[FD_HOST].revents & POLLOUT) != 0)
+        (void)pty_flush(&b->host);
+    if (b->device.fd >= 0 && fds[FD_DEVICE].fd == b->device.fd && fds[FD_DEVICE].revents != 0)
+        listen_to_device(b);
+    if (b->device.fd < 0 && b->now_us >= b->next_try_us && try_device(b) == DRYRIG_OK)
+        tell_link(b);
+    if (may_move(b) && b->now_us >= b->next_check_us) {
+        b->next_check_us = b->now_us + CHECK_US;
+        (void)dr_guard_self_check(&b->guard, bridge_now(b));
+        bridge_pump(b);
+    }
+    orders_continue(b);
+    orders_tell(b);
+}
+
+/* -- Starting ---------------------------------------------------------------------------------------------------------- */
+
+static int fail(const char *what, const char *why)
+{
+    (void)fprintf(stderr, "dryrig-guard: %s%s%s\n", what, *what != '\0' ? ": " : "", why);
+    return 1;
+}
+
+/* SIGINT and SIGTERM end the program even where they came in ignored, as in a background job; an ignored SIGHUP is somebody's
+ * wish (nohup). */
+static int open_signals(void)
+{
+    sigset_t ending;
+    struct sigaction hangup;
+    (void)sigemptyset(&ending);
+    (void)sigaddset(&ending, SIGINT);
+    (void)sigaddset(&ending, SIGTERM);
+    if (sigaction(SIGHUP, NULL, &hangup) != 0 || hangup.sa_handler != SIG_IGN)
+        (void)sigaddset(&ending, SIGHUP);
+    (void)sigprocmask(SIG_BLOCK, &ending, NULL);
+    (void)signal(SIGINT, SIG_DFL);
+    (void)signal(SIGTERM, SIG_DFL);
+    (void)signal(SIGPIPE, SIG_IGN);
+    return signalfd(-1, &ending, SFD_NONBLOCK | SFD_CLOEXEC);
+}
+
+static void introduce(const bridge *b)
+{
+    char firmware[16];
+    const dr_limits *const l = &b->rig.limits;
+    (void)dr_words_firmware(firmware, sizeof firmware, l->firmware);
+    (void)fprintf(stderr,
+                  "dryrig-guard guards a Sutter %s, firmware %s, at %s. It is not affiliated with Sutter Instrument.\n"
+                  "  limits:  %s, revision %u, hash %08X\n  host:    open %s instead of %s\n",
+                  dr_words_controller((dr_kind)l->kind), firmware, b->options->port, b->options->config, l->revision,
+                  dr_limits_crc(l), b->options->link != NULL ? b->options->link : b->host.path, b->options->port);
+}
+
+/* Everything is open. The guard wakes up, and so does the controller if the last guard died over it: it gets a ^C first. */
+static int start_and_run(bridge *b, bool after_crash)
+{
+    struct pollfd fds[FDS];
+    introduce(b);
+    dr_guard_init(&b->guard, &b->rig.limits, b->ring, BRIDGE_RING);
+    dr_guard_start(&b->guard, bridge_now(b), after_crash);
+    if (printf("ready %s\n", b->host.path) < 0 || fflush(stdout) != 0)
+        return fail("cannot write the line 'ready' to stdout", strerror(errno));
+    read_hints(b);
+    orders_tell(b);
+    for (;;) {
+        wait(b, fds);
+        if (fds[FD_SIGNALS].revents != 0)
+            break;
+        serve(b, fds);
+    }
+    /* As when the key is turned off: what moves is stopped. */
+    advance(b);
+    dr_guard_input(&b->guard, bridge_now(b), DR_INPUT_KEY, false);
+    bridge_pump(b);
+    return 0;
+}
+
+static int open_rest(bridge *b)
+{
+    const bridge_options *const o = b->options;
+    char why[RIG_WHY_MAX];
+    struct stat is;
+    if (!control_open(&b->control, o->control, why, sizeof why))
+        return fail("--control", why);
+    const bool had_link = o->link != NULL && lstat(o->link, &is) == 0;
+    const int link_lock = o->link == NULL ? -1 : link_make(o->link, b->host.path, why, sizeof why);
+    if (o->link != NULL && link_lock < 0) {
+        control_close(&b->control);
+        return fail("--link", why);
+    }
+    const int status = journal_open(&b->journal, o->log)
+                           ? start_and_run(b, had_link || b->control.replaced)
+                           : fail(o->log, errno == EINVAL ? "is no file" : strerror(errno));
+    journal_close(&b->journal);
+    if (o->link != NULL)
+        link_remove(o->link, b->host.path, link_lock);
+    control_close(&b->control);
+    return status;
+}
+
+int bridge_run(bridge *b, const bridge_options *options)
+{
+    b->options = options;
+    b->device = (device){.path = options->port, .fd = -1};
+    b->epoch_us = clock_us(CLOCK_MONOTONIC);
+    b->signals = open_signals();
+    b->inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    if (b->signals < 0 || b->inotify < 0)
+        return fail("cannot wait for events (/proc/sys/fs/inotify and ulimit -n have limits)", strerror(errno));
+    (void)prctl(PR_SET_TIMERSLACK, 1ul, 0ul, 0ul, 0ul); /* the usual slack is 50 us, half a byte time */
+
+    /* A port that is not there yet is waited for; one that is somebody else's, or no port, is an error now. */
+    const int result = try_device(b);
+    if (result != DRYRIG_OK && result != DRYRIG_ERR_NO_PORT)
+        return fail("--port", b->device_says);
+    const char *const wrong = pty_open(&b->host, b->inotify);
+    const int status = wrong != NULL ? fail(wrong, strerror(errno)) : open_rest(b);
+    if (wrong == NULL)
+        pty_close(&b->host);
+    device_close(&b->device);
+    return status;
+}

@@ -1,0 +1,74 @@
+/* bridge: dryrig-guard at work: the guard between a host's pseudo-terminal and the controller's port.
+ *
+ *     a host program <-> pty <-> dr_guard <-> device <-> the controller
+ *                                  ^  |
+ *                        orders <--+  +--> journal
+ *
+ * Thread-safety: one bridge a process. */
+#ifndef BRIDGE_H
+#define BRIDGE_H
+
+#include "control.h"
+#include "device.h"
+#include "journal.h"
+#include "pty.h"
+#include "rig.h"
+
+#include "dr_guard.h"
+
+#define BRIDGE_RING 256u
+
+typedef struct {
+    const char *port, *config, *link, *control, *log; /* link, control, log: NULL: without */
+} bridge_options;
+
+typedef enum { ORDER_NONE, ORDER_ARM, ORDER_CLEAR } order_kind;
+
+typedef struct {
+    const bridge_options *options;
+    rig rig;
+    dr_guard guard;
+    dr_record ring[BRIDGE_RING];
+    pty host;
+    device device;
+    control control;
+    journal journal;
+
+    uint64_t epoch_us, now_us;     /* of the monotonic clock; since then, when the present event came */
+    uint64_t next_try_us;          /* to open the device again */
+    uint64_t next_check_us;        /* of memory, while not disarmed */
+    char device_says[RIG_WHY_MAX]; /* why the device is not there */
+    int inotify, signals;
+    bool log_said;
+
+    order_kind order; /* that takes time */
+    bool order_pressed;
+    uint64_t order_until_us;
+    uint64_t calibrate_until_us; /* 0: not allowed */
+    bool surface_said;           /* a person has said whether the tip is in tissue */
+    bool was_armed;
+
+    dr_guard_status shown; /* what followers were told last */
+    bool shown_any, said_any;
+    uint8_t said_state, said_fault; /* what stderr was told last */
+    uint64_t refusals_said_us;
+} bridge;
+
+/* Runs until a signal. Returns the program's exit status. */
+int bridge_run(bridge *b, const bridge_options *options);
+
+/* -- For orders.c ------------------------------------------------------------------------------------------------------ */
+
+dr_us bridge_now(const bridge *b);
+/* After every call to the guard: what has to leave leaves, the records are kept. */
+void bridge_pump(bridge *b);
+
+/* An order of the second channel. context: the bridge. */
+void orders_take(void *context, control_client *who, const char *line);
+/* Goes on with an order that takes time; call it after every event. False: nothing to wait for by itself. */
+bool orders_due(const bridge *b, uint64_t *when_us);
+void orders_continue(bridge *b);
+/* Tells followers, and people at stderr, what has changed. */
+void orders_tell(bridge *b);
+
+#endif

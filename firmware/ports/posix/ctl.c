@@ -1,0 +1,132 @@
+#define _GNU_SOURCE /* getline */
+#include "ctl.h"
+
+#include <cjson/cJSON.h>
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#define ANSWER_LIMIT_S 15 /* an order takes 5 s at most */
+
+static const char *text_of(const cJSON *object, const char *key)
+{
+    const char *const text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, key));
+    return text != NULL ? text : "";
+}
+
+static bool is_true(const cJSON *object, const char *key)
+{
+    return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(object, key)) != 0;
+}
+
+static void print_position(const cJSON *position)
+{
+    const cJSON *const um = cJSON_GetObjectItemCaseSensitive(position, "um");
+    if (!cJSON_IsArray(um) || cJSON_GetArraySize(um) != 3)
+        return;
+    (void)printf("position: drive %d at %.3f, %.3f, %.3f um\n",
+                 (int)cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(position, "drive")),
+                 cJSON_GetNumberValue(cJSON_GetArrayItem(um, 0)), cJSON_GetNumberValue(cJSON_GetArrayItem(um, 1)),
+                 cJSON_GetNumberValue(cJSON_GetArrayItem(um, 2)));
+}
+
+static void print_status(const cJSON *all, const char *path)
+{
+    const cJSON *one;
+    (void)printf("state:    %s", text_of(all, "state"));
+    if (*text_of(all, "fault_says") != '\0')
+        (void)printf(": %s", text_of(all, "fault_says"));
+    (void)printf("%s\n", is_true(all, "alarm") ? " SOMETHING MAY STILL MOVE" : "");
+    if (*text_of(all, "device_says") != '\0')
+        (void)printf("port:     %s\n", text_of(all, "device_says"));
+    cJSON_ArrayForEach(one, cJSON_GetObjectItemCaseSensitive(all, "needs"))(void)
+        printf("needs:    %s: %s\n", text_of(one, "need"), text_of(one, "says"));
+    print_position(cJSON_GetObjectItemCaseSensitive(all, "position"));
+    const cJSON *const refusal = cJSON_GetObjectItemCaseSensitive(all, "last_refusal");
+    if (cJSON_IsObject(refusal))
+        (void)printf("refused:  '%s': %s\n", text_of(refusal, "command"), text_of(refusal, "says"));
+    if (*text_of(all, "next") != '\0')
+        (void)printf("next:     dryrig-guard ctl %s %s\n", path, text_of(all, "next"));
+}
+
+static void print_log(const cJSON *list)
+{
+    const cJSON *one;
+    cJSON_ArrayForEach(one, list)(void)
+        printf("%s %-11s %s\n", text_of(one, "time"), text_of(one, "event"), text_of(one, "says"));
+}
+
+/* Returns the exit status that the answer stands for. */
+static int tell(const char *line, const char *path, bool is_json)
+{
+    cJSON *const all = cJSON_Parse(line);
+    const bool done = all != NULL && is_true(all, "ok");
+    if (is_json) {
+        (void)fputs(line, stdout);
+    } else if (all == NULL) {
+        (void)fprintf(stderr, "dryrig-guard: %s: no answer of a guard\n", path);
+    } else {
+        const cJSON *const list = cJSON_GetObjectItemCaseSensitive(all, "log");
+        if (*text_of(all, "state") != '\0')
+            print_status(all, path);
+        print_log(list);
+    }
+    if (all != NULL && !done)
+        (void)fprintf(stderr, "dryrig-guard: %s\n", text_of(all, "why"));
+    (void)fflush(stdout);
+    cJSON_Delete(all);
+    return done ? 0 : CTL_NOT_DONE;
+}
+
+static int connect_to(const char *path)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const size_t length = strlen(path);
+    if (length == 0 || length >= sizeof address.sun_path) {
+        errno = ENAMETOOLONG;
+        return -1;
+    }
+    memcpy(address.sun_path, path, length + 1);
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fd >= 0 && connect(fd, (const struct sockaddr *)&address, sizeof address) == 0)
+        return fd;
+    const int error = errno;
+    if (fd >= 0)
+        (void)close(fd);
+    errno = error;
+    return -1;
+}
+
+int ctl_run(const char *path, const char *order, bool follows, bool is_json)
+{
+    char *line = NULL;
+    size_t room = 0;
+    int status = 1;
+    const struct timeval limit = {follows ? 0 : ANSWER_LIMIT_S, 0};
+    const int fd = connect_to(path);
+    FILE *const guard = fd >= 0 ? fdopen(fd, "r+") : NULL;
+    if (guard == NULL) {
+        (void)fprintf(stderr, "dryrig-guard: %s: %s%s\n", path, strerror(errno),
+                      errno == ECONNREFUSED || errno == ENOENT ? ". Does a guard run with --control there?" : "");
+        if (fd >= 0)
+            (void)close(fd);
+        return 1;
+    }
+    (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+    if (fprintf(guard, "%s\n", order) > 0 && fflush(guard) == 0)
+        while (getline(&line, &room, guard) > 0) {
+            status = tell(line, path, is_json);
+            if (!follows)
+                break;
+        }
+    if (line == NULL || (status == 1 && !follows))
+        (void)fprintf(stderr, "dryrig-guard: %s: the guard does not answer\n", path);
+    free(line);
+    (void)fclose(guard);
+    return status;
+}

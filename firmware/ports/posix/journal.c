@@ -1,0 +1,151 @@
+#define _GNU_SOURCE /* gmtime_r, getline */
+#include "journal.h"
+
+#include "guard_words.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#define US_PER_S UINT64_C(1000000)
+#define HEX_LENGTH (2u * DR_RECORD_BYTES)
+#define LINE_ROOM (JOURNAL_TIME_MAX + GUARD_WORDS_MAX + HEX_LENGTH + 32u)
+
+bool journal_open(journal *j, const char *path)
+{
+    struct stat is;
+    memset(j, 0, sizeof *j);
+    j->fd = -1;
+    if (path == NULL)
+        return true;
+    /* Not waiting: a pipe without a reader is refused, and so is what is no file. */
+    j->fd = open(path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, 0644);
+    if (j->fd >= 0 && fstat(j->fd, &is) == 0 && S_ISREG(is.st_mode))
+        return true;
+    const int why = j->fd < 0 ? errno : EINVAL;
+    journal_close(j);
+    errno = why;
+    return false;
+}
+
+void journal_close(journal *j)
+{
+    if (j->fd >= 0)
+        (void)close(j->fd);
+    j->fd = -1;
+}
+
+void journal_time(char text[JOURNAL_TIME_MAX], uint64_t wall_us)
+{
+    const time_t seconds = (time_t)(wall_us / US_PER_S);
+    struct tm parts;
+    char day[24] = "?";
+    if (gmtime_r(&seconds, &parts) != NULL)
+        (void)strftime(day, sizeof day, "%Y-%m-%dT%H:%M:%S", &parts);
+    (void)snprintf(text, JOURNAL_TIME_MAX, "%s.%06uZ", day, (unsigned)(wall_us % US_PER_S));
+}
+
+void journal_hex(char *out, const dr_record *record)
+{
+    static const char digits[] = "0123456789abcdef";
+    uint8_t bytes[DR_RECORD_BYTES];
+    dr_record_put(record, bytes);
+    for (unsigned i = 0; i < DR_RECORD_BYTES; i++) {
+        *out++ = digits[bytes[i] >> 4];
+        *out++ = digits[bytes[i] & 15u];
+    }
+    *out = '\0';
+}
+
+static bool write_line(const journal *j, const rig *r, const journal_entry *entry)
+{
+    char line[LINE_ROOM], time_text[JOURNAL_TIME_MAX], words[GUARD_WORDS_MAX], hex[HEX_LENGTH + 1u];
+    journal_time(time_text, entry->wall_us);
+    (void)guard_words_record(words, sizeof words, r, &entry->record);
+    journal_hex(hex, &entry->record);
+    const int length =
+        snprintf(line, sizeof line, "%s %-11s %s #%s\n", time_text, guard_words_event(entry->record.event), words, hex);
+    if (length < 0 || (size_t)length >= sizeof line)
+        return false;
+    return write(j->fd, line, (size_t)length) == (ssize_t)length;
+}
+
+bool journal_add(journal *j, const rig *r, const dr_record *record, uint64_t wall_us)
+{
+    journal_entry *const entry = &j->kept[j->count++ % JOURNAL_KEPT];
+    *entry = (journal_entry){wall_us, *record};
+    j->has_failed = j->fd >= 0 && !write_line(j, r, entry);
+    return !j->has_failed;
+}
+
+const journal_entry *journal_last(const journal *j, uint64_t n)
+{
+    return n < j->count && n < JOURNAL_KEPT ? &j->kept[(j->count - 1u - n) % JOURNAL_KEPT] : NULL;
+}
+
+/* -- Verifying --------------------------------------------------------------------------------------------------------- */
+
+static uint8_t nibble(char digit) { return (uint8_t)(digit <= '9' ? digit - '0' : digit - 'a' + 10); }
+
+static bool get_bytes(const char *line, uint8_t bytes[DR_RECORD_BYTES])
+{
+    const char *hex = strrchr(line, '#');
+    if (hex == NULL || strspn(hex + 1, "0123456789abcdef") != HEX_LENGTH || hex[HEX_LENGTH + 1u] != '\n')
+        return false;
+    hex++;
+    for (unsigned i = 0; i < DR_RECORD_BYTES; i++)
+        bytes[i] = (uint8_t)(nibble(hex[2u * i]) << 4 | nibble(hex[2u * i + 1u]));
+    return true;
+}
+
+static uint32_t get_uint(const uint8_t *bytes)
+{
+    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+}
+
+/* The chain begins anew with every start of a guard, at sequence 0. */
+static const char *verify_line(const char *line, uint32_t *sequence, uint32_t *crc)
+{
+    uint8_t bytes[DR_RECORD_BYTES];
+    const size_t body = DR_RECORD_BYTES - sizeof *crc;
+    if (!get_bytes(line, bytes))
+        return "there is no whole record";
+    const uint32_t number = get_uint(bytes), told = get_uint(bytes + body);
+    const uint32_t is = dr_crc32c(number == 0 ? 0 : *crc, bytes, body);
+    if (number != 0 && number != *sequence)
+        return "records are missing before it";
+    if (is != told)
+        return "the record was changed, or the one before it was";
+    *sequence = number + 1u;
+    *crc = told;
+    return NULL;
+}
+
+bool journal_verify(const char *path, uint64_t *records, uint64_t *starts, char *why, size_t room)
+{
+    FILE *file = fopen(path, "re");
+    char *line = NULL;
+    size_t line_room = 0;
+    uint32_t sequence = UINT32_MAX, crc = 0;
+    const char *wrong = NULL;
+    *records = *starts = 0;
+    if (file == NULL) {
+        (void)snprintf(why, room, "%s: %s", path, strerror(errno));
+        return false;
+    }
+    while (wrong == NULL && getline(&line, &line_room, file) > 0) {
+        wrong = verify_line(line, &sequence, &crc);
+        ++*records;
+        *starts += sequence == 1u;
+    }
+    if (wrong != NULL)
+        (void)snprintf(why, room, "%s:%llu: %s", path, (unsigned long long)*records, wrong);
+    free(line);
+    (void)fclose(file);
+    return wrong == NULL;
+}

@@ -1,0 +1,28 @@
+/* rig: reads the configuration of a guard: a text in microns becomes the limits that the core enforces.
+ *
+ * Every key is checked; a wrong one is an error with file and line. What only the owner knows has no default. Rounding to
+ * quanta is exact and safe: limits inwards, obstacles outwards. (A multiple of 1/64 um is exact in binary, and reading a
+ * decimal never carries it across one.)
+ * Errors are the author's of the file. Thread-safety: functions of their arguments only. */
+#ifndef RIG_H
+#define RIG_H
+
+#include "dr_limits.h"
+
+#define RIG_NAME_MAX 32u   /* of an obstacle, the closing 0 included */
+#define RIG_WHY_MAX 512u   /* room for every explanation */
+#define RIG_CONE_SLICES 8u /* boxes that stand for a cone; a cylinder takes one */
+#define RIG_GRID 40u       /* points an axis on which room is counted */
+
+typedef struct {
+    dr_limits limits;                           /* good: dr_limits_check() has passed them */
+    char names[DR_OBSTACLES_MAX][RIG_NAME_MAX]; /* of the obstacles; boxes that stand for one cone share its name */
+} rig;
+
+/* Reads a file. False: why[] says "FILE:LINE: what is wrong and what was expected", and *out must not be used. */
+bool rig_read(rig *out, const char *path, char *why, size_t room);
+
+/* At how many points of a grid of RIG_GRID^3 in a drive's box a tip may stand. one: where one of them is; NULL: never mind. */
+uint32_t rig_count_free(const dr_limits *limits, uint8_t drive, uint32_t one[DR_AXES]);
+
+#endif
