@@ -48,7 +48,7 @@ enum {
  * whole calibration. */
 typedef enum { DR_CALIBRATED, DR_UNCALIBRATED, DR_UNCALIBRATED_CYCLED } dr_calibration;
 
-/* One manipulator at one port. What it holds outlives power-off. */
+/* One manipulator at one port. All of it but the mode and at_home outlives power-off. */
 typedef struct {
     uint32_t position_steps[DR_AXES]; /* at rest; during a move: where the present leg began */
     uint32_t work_steps[DR_AXES];

@@ -159,7 +159,7 @@ typedef enum {
 /* Can this stage be connected to this port (1 to 4) of this controller? */
 dr_fit dr_stage_fits(dr_stage_id id, dr_kind kind, uint16_t firmware, uint8_t port);
 
-/* The microstep nearest to a length, and back. Fits 32 bits for every stage's travel. */
+/* The microstep nearest to a length of at most 2^26 - 1 um, which is more than any travel. */
 uint32_t dr_um_to_steps(uint32_t um, uint8_t quanta_per_step);
 
 /* -- Speeds -------------------------------------------------------------------------------------------------------- */
