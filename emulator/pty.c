@@ -33,7 +33,7 @@ static bool make_raw(pty *p)
 static bool watch(pty *p, int inotify_fd)
 {
     char directory[sizeof p->path];
-    (void)strcpy(directory, p->path);
+    memcpy(directory, p->path, sizeof directory);
     *strrchr(directory, '/') = '\0';
     p->watch = inotify_add_watch(inotify_fd, p->path, IN_OPEN | IN_CLOSE);
     return p->watch >= 0 && inotify_add_watch(inotify_fd, directory, IN_OPEN | IN_CLOSE) >= 0;
