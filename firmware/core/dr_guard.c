@@ -42,7 +42,7 @@ typedef enum {
 #define PROOF_RETRY_US MS(500) /* once that has failed */
 #define REPEAT_STOP_US MS(150)
 #define STOPS_MAX 3u
-#define HOST_STOPS_MAX 15u             /* known clients send as many running */
+#define HOST_STOPS_MAX 15u    /* known clients send as many running */
 #define SMALL_MOVE_US MS(100) /* 15 microsteps at the slowest speed take 15 ms */
 #define SMALL_MOVE_STEPS 16u  /* an MPC-200 ignores shorter moves, without a CR ([P], small-move-silent) */
 #define CALIBRATION_US MS(60000)
@@ -1241,13 +1241,13 @@ void dr_guard_push_device(dr_guard *g, dr_us now, const uint8_t *bytes, size_t c
     show_state(g, now);
 }
 
-/* The last byte of a motion frame is on the wire. */
+/* The last byte of a frame, or of the guard's own query, is on the wire. */
 static void frame_sent(dr_guard *g, dr_us now)
 {
     if (g->task == TASK_SEND) {
         g->task = TASK_MOVE;
         set_timer(g, DR_TIMER_TASK, now + longest_us(g));
-    } else if (g->task == TASK_STOP) { /* the stop that had to wait for it begins now */
+    } else if (g->task == TASK_STOP && g->read_phase == READ_OFF) { /* the stop that had to wait for it begins now */
         set_timer(g, DR_TIMER_TASK, now + QUIET_US);
         set_timer(g, DR_TIMER_PROOF, now + PROOF_OF_REST_US);
         set_timer(g, DR_TIMER_REPEAT, now + REPEAT_STOP_US);

@@ -211,7 +211,8 @@ static void row_23_all_first_bytes_in_all_states(void)
                 if (known && (command.is & DR_IS_INTERRUPT) != 0) {
                     TEST_ASSERT_EQUAL_MESSAGE(1, passed, "^C passes in every state");
                 } else if (known && command.args == DR_ARGS_NONE && (command.is & DR_IS_QUERY) != 0) {
-                    const bool quiet = state == AS_DISARMED || state == AS_IDLE || state == AS_FAULT || state == AS_STOPPED;
+                    const bool quiet =
+                        state == AS_DISARMED || state == AS_IDLE || state == AS_FAULT || state == AS_STOPPED;
                     TEST_ASSERT_EQUAL_MESSAGE(quiet ? 1 : 0, passed, "queries pass when it is quiet");
                 } else if (known && command.args == DR_ARGS_NONE && (command.is & DR_IS_SETTING) != 0 && byte != 'O') {
                     TEST_ASSERT_EQUAL(state == AS_DISARMED || state == AS_IDLE ? 1 : 0, passed);

@@ -1,0 +1,882 @@
+/* What a controller may do: rows 39 to 57 and 83 to 89 of the fault matrix, on a controller that misbehaves to order. */
+#include "bench.h"
+
+#include <string.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+/* A TRIO at 8 steps/um that does what the test says. */
+static struct {
+    uint32_t at[3], from[3], to[3];
+    uint64_t began, lasts;
+    bool moves;
+    bool silent, ignores_stop, no_cr, stops_short;
+    unsigned cr_at_percent; /* of the move; 100: at its end */
+    bool cr_said;
+    const char *stop_says; /* what ^C is answered with */
+    unsigned extra_crs;
+    int reply_length;        /* 14; fewer or more bytes of a position reply */
+    int bad_byte, bad_value; /* of it: index and value; -1: none */
+    unsigned bad_replies;    /* how many replies to spoil so */
+    dr_framer framer;
+} fake;
+
+static void fake_at(uint32_t *steps)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const uint64_t done = rig.now - fake.began;
+        steps[axis] = !fake.moves || done >= fake.lasts
+                          ? (fake.moves ? fake.to[axis] : fake.at[axis])
+                          : (uint32_t)((int64_t)fake.from[axis] + ((int64_t)fake.to[axis] - (int64_t)fake.from[axis]) *
+                                                                      (int64_t)done / (int64_t)fake.lasts);
+    }
+}
+
+static void fake_rest(void)
+{
+    fake_at(fake.at);
+    fake.moves = false;
+}
+
+static void fake_reply(void)
+{
+    uint32_t steps[3];
+    uint8_t reply[20];
+    fake_at(steps);
+    for (int i = 0; i < 12; i++)
+        reply[i] = (uint8_t)(steps[i / 4] >> (8 * (i % 4)));
+    reply[12] = 30;
+    reply[13] = reply[14] = reply[15] = '\r';
+    size_t length = 14;
+    if (fake.bad_replies > 0) {
+        fake.bad_replies--;
+        length = (size_t)fake.reply_length;
+        if (fake.bad_byte >= 0)
+            reply[fake.bad_byte] = (uint8_t)fake.bad_value;
+    }
+    device_says(reply, length);
+}
+
+static void fake_step(void)
+{
+    for (int byte = wire_next(); byte >= 0; byte = wire_next()) {
+        dr_command command;
+        if (dr_framer_push(&fake.framer, DR_TRIO, DR_FIRMWARE_TRIO, (uint8_t)byte, &command) != DR_FRAMED_WHOLE ||
+            fake.silent)
+            continue;
+        const dr_request request = dr_wire_get_request(&command, fake.framer.bytes);
+        if (command.op == DR_OP_TRIO_POSITION) {
+            fake_reply();
+        } else if ((command.is & DR_IS_INTERRUPT) != 0) {
+            if (fake.moves && fake.ignores_stop)
+                continue;
+            fake_rest();
+            device_says(fake.stop_says, strlen(fake.stop_says));
+        } else if ((command.is & DR_IS_MOTION) != 0) {
+            const uint8_t only = dr_wire_axis((dr_op)command.op);
+            fake_rest();
+            memcpy(fake.from, fake.at, sizeof fake.at);
+            memcpy(fake.to, fake.at, sizeof fake.at);
+            for (uint8_t axis = 0; axis < 3; axis++)
+                if (only == DR_AXES || only == axis)
+                    fake.to[axis] = request.steps[axis];
+            if (fake.stops_short)
+                fake.to[0] -= 3;
+            fake.began = rig.now;
+            fake.moves = true;
+            fake.cr_said = false;
+        } else {
+            device_says("\r", 1);
+        }
+    }
+    if (fake.moves && !fake.cr_said && rig.now - fake.began >= fake.lasts * fake.cr_at_percent / 100) {
+        fake.cr_said = true;
+        if (!fake.no_cr)
+            for (unsigned i = 0; i <= fake.extra_crs; i++)
+                device_says("\r", 1);
+    }
+    if (fake.moves && rig.now - fake.began >= fake.lasts)
+        fake_rest();
+}
+
+static void fake_ms(unsigned ms)
+{
+    for (unsigned i = 0; i < ms * 10; i++) {
+        run_us(100);
+        fake_step();
+    }
+}
+
+static void fake_rig(void)
+{
+    bench_trio();
+    rig.by_hand = true;
+    memset(&fake, 0, sizeof fake);
+    fake.at[0] = fake.at[1] = fake.at[2] = 40000;
+    fake.lasts = 200000;
+    fake.cr_at_percent = 100;
+    fake.stop_says = "\r";
+    fake.bad_byte = -1;
+    bench_start();
+    fake_ms(1100);
+    expect_state(DR_GUARD_DISARMED);
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    fake_ms(150);
+    expect_state(DR_GUARD_IDLE);
+}
+
+/* A line of 500 um, of which `ms` have passed. */
+static void fake_move(unsigned ms)
+{
+    host_line(8, 44000, 40000, 40000);
+    fake_ms(ms);
+}
+
+static void the_controller_to_order_works_when_nothing_is_ordered(void)
+{
+    fake_rig();
+    fake_move(300);
+    expect_cr();
+    expect_state(DR_GUARD_IDLE);
+    TEST_ASSERT_EQUAL(44000, fake.at[0]);
+}
+
+static void row_39_a_lost_cr(void)
+{
+    fake_rig();
+    fake.no_cr = true;
+    fake_move(3000);
+    expect_state(DR_GUARD_FAULT);
+    expect_fault(DR_FAULT_NO_CR);
+    expect_silence();
+    TEST_ASSERT_TRUE(wire_stops() >= 1);
+    TEST_ASSERT_TRUE(status().position_known);
+    TEST_ASSERT_EQUAL(44000, status().position_steps[0]);
+}
+
+static void row_40_a_late_cr_is_not_forwarded(void)
+{
+    for (unsigned late_s = 1; late_s <= 10; late_s += 3) {
+        fake_rig();
+        fake.no_cr = true;
+        fake_move(3000);
+        fake_ms(late_s * 1000);
+        device_says("\r", 1);
+        fake_ms(1100);
+        expect_silence();
+        expect_fault(DR_FAULT_NO_CR);
+        TEST_ASSERT_NOT_NULL(last_record(DR_EVENT_QUARANTINED));
+    }
+}
+
+static void row_41_of_many_crs_one_is_forwarded(void)
+{
+    for (unsigned extra = 1; extra <= 5; extra++) {
+        fake_rig();
+        fake.extra_crs = extra;
+        fake_move(400);
+        expect_cr();
+        expect_silence();
+        expect_state(DR_GUARD_IDLE);
+        host_code('c');
+        fake_ms(10);
+        TEST_ASSERT_EQUAL(14, rig.heard_count - rig.heard_taken);
+    }
+}
+
+static void row_42_a_cr_before_the_end(void)
+{
+    for (unsigned percent = 0; percent < 50; percent += 5) {
+        fake_rig();
+        fake.lasts = 400000;
+        fake.cr_at_percent = percent;
+        fake_move(1000);
+        expect_state(DR_GUARD_FAULT);
+        expect_fault(DR_FAULT_EARLY_CR);
+        expect_silence();
+        TEST_ASSERT_TRUE(wire_stops() >= 1);
+        TEST_ASSERT_FALSE(fake.moves);
+        TEST_ASSERT_NOT_EQUAL(44000, fake.at[0]);
+    }
+    /* So late that the tip is there at the second look: not believed either, but nothing moves. */
+    fake_rig();
+    fake.cr_at_percent = 80;
+    fake_move(1000);
+    TEST_ASSERT_EQUAL(44000, fake.at[0]);
+}
+
+static void row_43_answers_to_ctrl_c_of_all_kinds(void)
+{
+    static const char *const says[] = {"", "\r", "\r\r", "I", "I\r", "=", "=\r", "I\r\r", "=\r\r"};
+    for (size_t i = 0; i < sizeof says / sizeof *says; i++) {
+        fake_rig();
+        fake.stop_says = says[i];
+        fake_move(100);
+        expect_state(DR_GUARD_MOVING_S);
+        host_code(3);
+        fake_ms(1200);
+        expect_state(DR_GUARD_IDLE);
+        expect_fault(DR_FAULT_NONE);
+        if (strchr(says[i], '\r') != NULL)
+            expect_cr();
+        expect_silence(); /* one CR if there was one, never an 'I' or '=' */
+    }
+}
+
+static void row_44_one_bad_position_reply_is_asked_for_again_two_are_a_fault(void)
+{
+    static const struct {
+        int length, byte, value;
+    } bad[] = {{13, -1, 0}, {1, -1, 0}, {14, 13, 'x'}, {14, 12, 91}, {14, 3, 0x0D}, {14, 7, 1}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        for (unsigned times = 1; times <= 2; times++) {
+            fake_rig();
+            fake.reply_length = bad[i].length;
+            fake.bad_byte = bad[i].byte;
+            fake.bad_value = bad[i].value;
+            fake.bad_replies = times;
+            fake_move(1000);
+            if (times == 1) {
+                expect_cr();
+                expect_state(DR_GUARD_IDLE);
+            } else {
+                expect_silence();
+                expect_fault(DR_FAULT_IMPLAUSIBLE);
+                expect_refused(DR_REASON_NO_POSITION);
+                TEST_ASSERT_EQUAL(40000, fake.at[0]);
+            }
+        }
+}
+
+static void row_44_a_reply_that_is_too_long_is_asked_for_again(void)
+{
+    fake_rig();
+    fake.reply_length = 15;
+    fake.bad_replies = 1;
+    fake_move(1000);
+    expect_cr();
+    TEST_ASSERT_EQUAL(44000, fake.at[0]);
+    fake_rig();
+    fake.reply_length = 15;
+    fake.bad_replies = 2;
+    fake_move(1000);
+    expect_silence();
+    expect_fault(DR_FAULT_IMPLAUSIBLE);
+    TEST_ASSERT_EQUAL(40000, fake.at[0]);
+}
+
+static void row_44_a_0x0d_within_a_coordinate_ends_nothing(void)
+{
+    fake_rig();
+    fake.at[0] = fake.at[1] = 0x0D0D;
+    fake_ms(25000); /* by knob */
+    host_code('c');
+    fake_ms(10);
+    TEST_ASSERT_EQUAL(14, rig.heard_count - rig.heard_taken);
+    rig.heard_taken = rig.heard_count;
+}
+
+static void row_44_a_host_gets_nonsense_and_the_guard_asks_itself(void)
+{
+    fake_rig();
+    fake.reply_length = 14;
+    fake.bad_byte = 12;
+    fake.bad_value = 91;
+    fake.bad_replies = 1;
+    host_code('c');
+    fake_ms(300);
+    expect_state(DR_GUARD_IDLE);
+    TEST_ASSERT_EQUAL(14, rig.heard_count - rig.heard_taken); /* as it came */
+    fake.bad_replies = 3;
+    host_code('c');
+    fake_ms(500);
+    expect_fault(DR_FAULT_IMPLAUSIBLE);
+}
+
+static void row_45_impossible_drives(void)
+{
+    static const uint8_t drives[] = {0, 5, 'E', 255};
+    for (size_t i = 0; i < sizeof drives; i++) {
+        bench_armed_mpc();
+        rig.by_hand = true;
+        host_point('M', 81000, 80000, 80000);
+        for (int times = 0; times < 2; times++) {
+            const uint8_t reply[14] = {drives[i], 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x0D};
+            run_ms(120);
+            device_says(reply, 14);
+        }
+        run_ms(10);
+        expect_fault(DR_FAULT_IMPLAUSIBLE);
+        expect_refused(DR_REASON_NO_POSITION);
+    }
+}
+
+static void row_46_small_moves_may_be_ignored(void)
+{
+    for (unsigned quirk = 0; quirk < 2; quirk++)
+        for (uint32_t steps = 0; steps <= 16; steps++) {
+            bench_mpc();
+            rig.controller.quirks = quirk == 0 ? 0 : DR_QUIRK_SMALL_MOVE_SILENT;
+            bench_start();
+            bench_arm();
+            host_point('M', 80000 + steps, 80000 - steps, 80000);
+            run_ms(500);
+            expect_state(DR_GUARD_IDLE);
+            expect_fault(DR_FAULT_NONE);
+            if (quirk == 0 || steps == 16)
+                expect_cr();
+            expect_silence();
+            const uint32_t x = quirk == 1 && steps < 16 ? 80000 : 80000 + steps;
+            expect_tip(0, x, 160000 - x, 80000);
+        }
+}
+
+static void row_47_an_end_elsewhere(void)
+{
+    fake_rig();
+    fake.stops_short = true; /* by 3 microsteps */
+    fake_move(600);
+    expect_fault(DR_FAULT_WRONG_END);
+    expect_state(DR_GUARD_FAULT);
+    expect_silence();
+}
+
+static void row_47_y_that_is_locked_out_of_homing_is_no_wrong_end(void)
+{
+    for (unsigned locked_out = 0; locked_out < 2; locked_out++) {
+        bench_trio();
+        rig.limits.rig |= locked_out == 1 ? DR_RIG_Y_LOCKED_OUT : 0;
+        rig.limits.unstoppable_ms = 60000;
+        rig.limits.drives[0].max_move_q = (uint32_t)DR_FAR_Q;
+        rig.limits.drives[0].box_q = (dr_box){{0, 0, 0}, {1600000, 1600000, 1600000}};
+        rig.drives[0].y_moves_home = false;
+        rig.drives[0].position_steps[DR_Y] = 40000;
+        bench_start();
+        bench_arm();
+        host_code('h');
+        run_ms(4000);
+        expect_tip(0, 0, 40000, 0);
+        expect_fault(DR_FAULT_NONE); /* a hidden target: anywhere in the travel */
+        host_point('H', 800, 40000, 800);
+        run_ms(2000);
+        expect_fault(DR_FAULT_NONE);
+    }
+}
+
+static void row_48_ctrl_c_that_is_ignored(void)
+{
+    fake_rig();
+    rig.limits.rig |= DR_RIG_HAS_CUT;
+    rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+    fake.ignores_stop = true;
+    fake.lasts = 5000000;
+    fake_move(100);
+    host_code(3);
+    fake_ms(200);
+    expect_state(DR_GUARD_STOPPING);
+    fake_ms(850);
+    expect_fault(DR_FAULT_UNSTOPPABLE);
+    TEST_ASSERT_EQUAL(3, wire_stops());
+    TEST_ASSERT_TRUE(status().buzzer);
+    TEST_ASSERT_TRUE(status().cut);
+    fake_ms(6000); /* it comes to rest by itself */
+    expect_state(DR_GUARD_FAULT);
+    expect_fault(DR_FAULT_UNSTOPPABLE);
+    TEST_ASSERT_FALSE(status().buzzer);
+    TEST_ASSERT_TRUE(status().cut); /* until the fault is cleared */
+    clear_fault();
+    TEST_ASSERT_FALSE(status().cut);
+    expect_state(DR_GUARD_LOCKED); /* power was off: who is there? */
+    fake_ms(1200);
+    expect_state(DR_GUARD_DISARMED);
+}
+
+static void a_rig_that_calibrates_at_power_on_gets_its_power_back_when_a_person_confirms(void)
+{
+    fake_rig();
+    rig.limits.rig |= DR_RIG_HAS_CUT | DR_RIG_CALIBRATES_AT_POWER_ON;
+    rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+    fake.ignores_stop = true;
+    fake.lasts = 3000000;
+    fake_move(100);
+    host_code(3);
+    fake_ms(5000);
+    clear_fault();
+    TEST_ASSERT_TRUE(status().cut);
+    TEST_ASSERT_TRUE(status().confirm_wanted);
+    press(DR_INPUT_CONFIRM);
+    TEST_ASSERT_FALSE(status().cut);
+    expect_state(DR_GUARD_LOCKED);
+    fake_ms(1200);
+    expect_state(DR_GUARD_DISARMED);
+}
+
+static void row_49_pause_on_stop(void)
+{
+    bench_mpc();
+    rig.controller.quirks = DR_QUIRK_PAUSE_ON_STOP;
+    keep_out(5600, 6000, 4000, 4900, 4000, 6000); /* beside the old way, below it in Y */
+    bench_start();
+    bench_arm();
+    host_line(15, 96000, 80000, 80000); /* to 6,000 um */
+    run_ms(200);
+    host_code(3);
+    run_ms(600);
+    expect_state(DR_GUARD_IDLE);
+    expect_cr();
+    /* From here the hull to the old target is clear: allowed, and the controller does the old move instead. */
+    host_point('M', 80000, 80000, 80000);
+    run_ms(2000);
+    expect_tip(0, 96000, 80000, 80000);
+    expect_fault(DR_FAULT_RESUMED_OLD_MOVE);
+    expect_silence();
+}
+
+static void row_49_the_old_target_is_kept_until_a_motion_has_ended_at_its_own(void)
+{
+    bench_mpc(); /* a controller that does forget */
+    keep_out(5600, 5900, 5300, 5600, 4000, 6000);
+    bench_start();
+    bench_arm();
+    host_line(4, 96000, 80000, 80000);
+    run_ms(200);
+    host_code(3);
+    run_ms(600);
+    expect_cr();
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open);
+    host_line(15, 80000, 88800, 80000); /* to Y = 5,550 um: its own way is clear */
+    run_ms(2000);
+    expect_cr();
+    TEST_ASSERT_FALSE(rig.guard.scene.old[0].is_open);
+
+    host_line(4, 80000, 80000, 80000);
+    run_ms(200);
+    host_code(3);
+    run_ms(600);
+    expect_cr();
+    rig.guard.scene.old[0].target_q = (dr_box){{UM(6000), UM(5000), UM(5000)}, {UM(6000), UM(5000), UM(5000)}};
+    host_line(15, 80000, 80000, 80000);
+    run_ms(1000);
+    expect_refused(DR_REASON_OLD_TARGET);
+    expect_silence();
+}
+
+static void row_50_stop_during_motions_that_cannot_be_stopped(void)
+{
+    static const char codes[] = "HWxyz";
+    for (size_t c = 0; c < sizeof codes - 1; c++) {
+        bench_armed_trio();
+        if (codes[c] == 'H' || codes[c] == 'W')
+            host_point(codes[c], 40800, 40800, 40800);
+        else
+            host_axis(codes[c], 40800);
+        run_ms(15);
+        expect_state(DR_GUARD_MOVING_U);
+        stop_input(true);
+        expect_state(DR_GUARD_STOPPING);
+        expect_fault(DR_FAULT_UNSTOPPABLE);
+        TEST_ASSERT_TRUE(status().buzzer);
+        TEST_ASSERT_EQUAL(1, wire_stops());
+        run_ms(10);
+        TEST_ASSERT_TRUE(status().buzzer); /* no false claim */
+        run_ms(500);
+        TEST_ASSERT_FALSE(status().buzzer);
+        expect_state(DR_GUARD_FAULT);
+        expect_silence(); /* the host asked for a move, and a person stopped it: no CR */
+        TEST_ASSERT_EQUAL(1, wire_stops());
+    }
+}
+
+static void row_50_a_hosts_ctrl_c_there_is_passed_on_and_changes_nothing(void)
+{
+    bench_armed_trio();
+    host_axis('x', 44000);
+    run_ms(30);
+    host_code(3);
+    run_us(400);
+    TEST_ASSERT_EQUAL(1, wire_stops());
+    run_ms(300);
+    expect_cr();
+    expect_silence();
+    expect_state(DR_GUARD_IDLE);
+    expect_tip(0, 44000, 40000, 40000);
+}
+
+static void row_52_real_speeds_are_other_than_documented(void)
+{
+    for (unsigned level = 0; level < 16; level += 5) {
+        bench_mpc();
+        rig.controller.quirks = DR_QUIRK_MEASURED_SPEEDS;
+        bench_start();
+        bench_arm();
+        host_line(level, 88000, 80000, 80000);
+        run_ms(3000);
+        expect_cr();
+        expect_state(DR_GUARD_IDLE);
+    }
+    fake_rig();
+    fake.lasts = 260000; /* 2.6 times as long as level 8 should take */
+    fake_move(2500);
+    expect_cr();
+    expect_state(DR_GUARD_IDLE);
+}
+
+static void row_53_silent_from_the_start_or_in_the_middle(void)
+{
+    bench_trio();
+    rig.by_hand = true;
+    memset(&fake, 0, sizeof fake);
+    fake.silent = true;
+    bench_start();
+    fake_ms(5000);
+    expect_state(DR_GUARD_LOCKED);
+    expect_fault(DR_FAULT_DEVICE_SILENT);
+    host_code('c');
+    fake_ms(1);
+    expect_silence();
+
+    fake_rig();
+    fake.silent = true;
+    fake_move(2500); /* the query before the motion */
+    expect_fault(DR_FAULT_DEVICE_SILENT);
+    expect_refused(DR_REASON_NO_POSITION);
+
+    fake_rig();
+    fake_move(50);
+    fake.silent = true;
+    fake_ms(8000); /* the motion's CR, then the query after ^C */
+    expect_fault(DR_FAULT_DEVICE_SILENT);
+    expect_silence();
+    TEST_ASSERT_EQUAL(3, wire_stops());
+
+    fake_rig();
+    fake.silent = true;
+    host_code('c');
+    fake_ms(2500); /* a host's query: the guard has no opinion */
+    expect_fault(DR_FAULT_NONE);
+    TEST_ASSERT_NOT_NULL(last_record(DR_EVENT_NO_REPLY));
+}
+
+static void proof_is_given_up_and_tried_again_by_the_key(void)
+{
+    bench_trio();
+    rig.by_hand = true;
+    memset(&fake, 0, sizeof fake);
+    fake.silent = true;
+    bench_start();
+    run_ms(200000);
+    expect_state(DR_GUARD_LOCKED);
+    TEST_ASSERT_EQUAL(0, rig.guard.task);
+    rig.wire_taken = rig.wire_count;
+    fake.at[0] = fake.at[1] = fake.at[2] = 40000;
+    fake.silent = false;
+    fake.stop_says = "\r";
+    clear_fault();
+    fake_ms(1200);
+    expect_state(DR_GUARD_DISARMED);
+}
+
+static void row_54_unplugged_and_plugged_in_again(void)
+{
+    bench_armed_trio();
+    host_line(0, 42000, 40000, 40000);
+    run_ms(100);
+    dr_guard_link(&rig.guard, (dr_us)(rig.clock_at_start + rig.now), true, false);
+    run_ms(10);
+    expect_state(DR_GUARD_LOCKED);
+    expect_fault(DR_FAULT_NO_DEVICE);
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open);
+    host_code('c');
+    host_code(3);
+    run_ms(2000);
+    dr_guard_link(&rig.guard, (dr_us)(rig.clock_at_start + rig.now), true, true);
+    run_ms(1200);
+    expect_state(DR_GUARD_DISARMED);
+    expect_fault(DR_FAULT_NONE);
+}
+
+static void row_54_another_firmware_locks(void)
+{
+    bench_armed_mpc();
+    host_code('K');
+    run_ms(10);
+    expect_state(DR_GUARD_IDLE);
+    rig.controller.firmware = 0x0320;
+    host_code('K');
+    run_ms(10);
+    expect_state(DR_GUARD_LOCKED);
+    expect_fault(DR_FAULT_IDENTITY);
+    clear_fault();
+    run_ms(1500);
+    expect_state(DR_GUARD_LOCKED);
+}
+
+static void the_other_controller_is_not_taken_for_the_one_of_the_limits(void)
+{
+    static const uint8_t mpc[14] = {1, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x0D};
+    static const uint8_t zero[14] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x0D};
+    static const uint8_t trio[14] = {0x40, 0x9C, 0, 0, 0x40, 0x9C, 0, 0, 0x40, 0x9C, 0, 0, 30, 0x0D};
+    bench_trio();
+    rig.by_hand = true;
+    bench_start();
+    for (int i = 0; i < 4; i++) {
+        run_ms(1150);
+        device_says(mpc, 14);
+    }
+    expect_state(DR_GUARD_LOCKED);
+    bench_mpc();
+    rig.by_hand = true;
+    bench_start();
+    for (int i = 0; i < 4; i++) {
+        run_ms(1150);
+        device_says(trio, 14);
+    }
+    expect_state(DR_GUARD_LOCKED);
+    expect_fault(DR_FAULT_IDENTITY);
+    bench_mpc();
+    rig.by_hand = true;
+    bench_start();
+    run_ms(1001);
+    device_says(zero, 14); /* an MPC-200 at 0,0,0 is one: a TRIO there would tell an angle */
+    expect_state(DR_GUARD_DISARMED);
+    bench_trio();
+    rig.by_hand = true;
+    bench_start();
+    run_ms(1001);
+    device_says(zero, 14); /* a TRIO at 0 degrees, or an MPC-200: a person decides */
+    expect_state(DR_GUARD_LOCKED);
+    TEST_ASSERT_TRUE(status().confirm_wanted);
+    host_code('c');
+    run_ms(1);
+    TEST_ASSERT_EQUAL('c', rig.wire[rig.wire_count - 1]);
+    device_says(zero, 14);
+    press(DR_INPUT_CONFIRM);
+    expect_state(DR_GUARD_DISARMED);
+}
+
+static void row_55_a_controller_that_was_power_cycled(void)
+{
+    fake_rig();
+    fake.at[0] = fake.at[1] = fake.at[2] = 8000; /* where a calibration ends */
+    fake_move(100);
+    expect_fault(DR_FAULT_POSITION_JUMP);
+    expect_refused(DR_REASON_NO_POSITION);
+    TEST_ASSERT_EQUAL(8000, fake.at[0]);
+    fake_rig();
+    fake.at[0] += 20 * 8;
+    fake_move(400);
+    expect_cr(); /* 20 um */
+    fake_rig();
+    fake.at[0] += 20 * 8 + 1;
+    fake_move(400);
+    expect_fault(DR_FAULT_POSITION_JUMP); /* the knobs are said to be locked */
+    fake_rig();
+    fake.at[0] = 8000;
+    host_code('c'); /* a host's query tells it too */
+    fake_ms(20);
+    expect_fault(DR_FAULT_POSITION_JUMP);
+}
+
+static void row_56_the_pause_that_the_controller_needs(void)
+{
+    bench_mpc();
+    rig.controller.quirks = DR_QUIRK_S_NEEDS_PAUSE;
+    bench_start();
+    bench_arm();
+    for (int i = 0; i < 5; i++) {
+        host_line(15, 80000 + (i % 2 == 0 ? 1600u : 0u), 80000, 80000);
+        run_ms(400);
+        expect_cr();
+        TEST_ASSERT_EQUAL(DR_STATE_REST, rig.controller.state);
+    }
+}
+
+static void row_57_bytes_that_nobody_asked_for(void)
+{
+    for (int byte = 0; byte < 256; byte++) {
+        const uint8_t noise = (uint8_t)byte;
+        bench_armed_trio();
+        for (int i = 0; i < 16; i++)
+            device_says(&noise, 1);
+        expect_state(DR_GUARD_IDLE);
+        run_ms(1100);
+        for (int i = 0; i < 16; i++)
+            device_says(&noise, 1);
+        expect_fault(DR_FAULT_NONE);
+        device_says(&noise, 1);
+        expect_fault(DR_FAULT_DEVICE_NOISE);
+        run_ms(1100);
+        expect_silence();
+        TEST_ASSERT_EQUAL(33, status().quarantined_bytes);
+    }
+}
+
+static void noise_while_it_moves_stops(void)
+{
+    bench_armed_trio();
+    host_line(0, 44000, 40000, 40000);
+    run_ms(100);
+    for (int i = 0; i < 17; i++)
+        device_says("?", 1);
+    expect_state(DR_GUARD_STOPPING);
+    run_ms(600);
+    expect_state(DR_GUARD_FAULT);
+    expect_fault(DR_FAULT_DEVICE_NOISE);
+    expect_silence();
+}
+
+static void row_83_position_replies_of_13_bytes(void)
+{
+    static const uint8_t thirteen[13] = {0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x0D};
+    bench_armed_mpc();
+    rig.by_hand = true;
+    host_point('M', 81000, 80000, 80000);
+    for (int i = 0; i < 2; i++) {
+        run_ms(250);
+        device_says(thirteen, 13);
+    }
+    run_ms(200);
+    expect_fault(DR_FAULT_IMPLAUSIBLE);
+    TEST_ASSERT_EQUAL(80000, status().position_steps[0]);
+}
+
+static void row_84_filler_during_a_long_move(void)
+{
+    fake_rig();
+    fake.lasts = 800000;
+    fake_move(20);
+    for (int i = 0; i < 7; i++) {
+        device_says("\0", 1);
+        fake_ms(100);
+    }
+    expect_state(DR_GUARD_MOVING_S);
+    expect_silence();
+    fake_ms(300);
+    expect_cr();
+    expect_silence();
+    expect_state(DR_GUARD_IDLE);
+}
+
+static void row_85_stop_at_the_roe_puts_an_i_on_the_line_and_no_cr(void)
+{
+    fake_rig();
+    fake.no_cr = true;
+    fake_move(100);
+    fake_rest();
+    device_says("I", 1);
+    fake_ms(3500);
+    expect_fault(DR_FAULT_NO_CR);
+    expect_silence();
+}
+
+static void row_86_a_calibration_that_was_broken_off(void)
+{
+    for (unsigned percent = 10; percent < 100; percent += 20) {
+        bench_mpc();
+        rig.limits.rig |= DR_RIG_MAY_CALIBRATE;
+        bench_start();
+        bench_arm();
+        rig.watch_tip = false; /* a calibration leaves the box by leave */
+        host_code('N');
+        run_ms(100);
+        expect_refused(DR_REASON_CALIBRATE);
+        input(DR_INPUT_MAY_CALIBRATE, true);
+        host_code('N');
+        run_ms(3500 * percent / 100);
+        expect_state(DR_GUARD_MOVING_S);
+        host_code(3);
+        run_ms(600);
+        expect_state(DR_GUARD_FAULT);
+        expect_fault(DR_FAULT_FRAME_LOST);
+        rig.heard_taken = rig.heard_count;
+        clear_fault();
+        input(DR_INPUT_ESCAPE, true);
+        press(DR_INPUT_ARM);
+        run_ms(150);
+        expect_state(DR_GUARD_IDLE);
+        host_line(3, 1600, 1600, 1600);
+        run_ms(100);
+        expect_refused(DR_REASON_FRAME_LOST);
+        host_code('N');
+        run_ms(10000);
+        expect_cr();
+        expect_state(DR_GUARD_IDLE);
+        TEST_ASSERT_FALSE(rig.guard.scene.frame_lost);
+    }
+}
+
+static void row_17_a_trio_calibrates_with_leave(void)
+{
+    bench_trio();
+    rig.limits.rig |= DR_RIG_MAY_CALIBRATE;
+    bench_start();
+    bench_arm();
+    rig.watch_tip = false;
+    input(DR_INPUT_MAY_CALIBRATE, true);
+    host_code('R');
+    run_ms(6000);
+    expect_cr();
+    expect_tip(0, 8000, 8000, 8000);
+    expect_state(DR_GUARD_IDLE);
+}
+
+static void row_88_no_manipulator_connected(void)
+{
+    bench_armed_mpc();
+    dr_hand unplug = {DR_HAND_CONNECT, 0, DR_STAGE_NONE, {0, 0, 0}};
+    TEST_ASSERT_TRUE(dr_controller_poke(&rig.controller, (dr_us)(rig.clock_at_start + rig.now), &unplug));
+    unplug.drive = 1;
+    TEST_ASSERT_TRUE(dr_controller_poke(&rig.controller, (dr_us)(rig.clock_at_start + rig.now), &unplug));
+    host_code('U');
+    run_ms(2100);
+    expect_fault(DR_FAULT_NONE);
+    expect_silence();
+    host_point('M', 81000, 80000, 80000);
+    run_ms(2100);
+    expect_fault(DR_FAULT_DEVICE_SILENT);
+    expect_refused(DR_REASON_NO_POSITION);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(the_controller_to_order_works_when_nothing_is_ordered);
+    RUN_TEST(row_39_a_lost_cr);
+    RUN_TEST(row_40_a_late_cr_is_not_forwarded);
+    RUN_TEST(row_41_of_many_crs_one_is_forwarded);
+    RUN_TEST(row_42_a_cr_before_the_end);
+    RUN_TEST(row_43_answers_to_ctrl_c_of_all_kinds);
+    RUN_TEST(row_44_one_bad_position_reply_is_asked_for_again_two_are_a_fault);
+    RUN_TEST(row_44_a_reply_that_is_too_long_is_asked_for_again);
+    RUN_TEST(row_44_a_0x0d_within_a_coordinate_ends_nothing);
+    RUN_TEST(row_44_a_host_gets_nonsense_and_the_guard_asks_itself);
+    RUN_TEST(row_45_impossible_drives);
+    RUN_TEST(row_46_small_moves_may_be_ignored);
+    RUN_TEST(row_47_an_end_elsewhere);
+    RUN_TEST(row_47_y_that_is_locked_out_of_homing_is_no_wrong_end);
+    RUN_TEST(row_48_ctrl_c_that_is_ignored);
+    RUN_TEST(a_rig_that_calibrates_at_power_on_gets_its_power_back_when_a_person_confirms);
+    RUN_TEST(row_49_pause_on_stop);
+    RUN_TEST(row_49_the_old_target_is_kept_until_a_motion_has_ended_at_its_own);
+    RUN_TEST(row_50_stop_during_motions_that_cannot_be_stopped);
+    RUN_TEST(row_50_a_hosts_ctrl_c_there_is_passed_on_and_changes_nothing);
+    RUN_TEST(row_52_real_speeds_are_other_than_documented);
+    RUN_TEST(row_53_silent_from_the_start_or_in_the_middle);
+    RUN_TEST(proof_is_given_up_and_tried_again_by_the_key);
+    RUN_TEST(row_54_unplugged_and_plugged_in_again);
+    RUN_TEST(row_54_another_firmware_locks);
+    RUN_TEST(the_other_controller_is_not_taken_for_the_one_of_the_limits);
+    RUN_TEST(row_55_a_controller_that_was_power_cycled);
+    RUN_TEST(row_56_the_pause_that_the_controller_needs);
+    RUN_TEST(row_57_bytes_that_nobody_asked_for);
+    RUN_TEST(noise_while_it_moves_stops);
+    RUN_TEST(row_83_position_replies_of_13_bytes);
+    RUN_TEST(row_84_filler_during_a_long_move);
+    RUN_TEST(row_85_stop_at_the_roe_puts_an_i_on_the_line_and_no_cr);
+    RUN_TEST(row_86_a_calibration_that_was_broken_off);
+    RUN_TEST(row_17_a_trio_calibrates_with_leave);
+    RUN_TEST(row_88_no_manipulator_connected);
+    return UNITY_END();
+}
