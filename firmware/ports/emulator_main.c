@@ -109,10 +109,12 @@ void dr_emulator_step(void)
     }
     hear(now);
     bool has_end = tell(now, &until);
+    const bool keeps = dr_keep_step(&keep, &controller, now, &other);
+    if (!dr_port_waits())
+        return;
+    sooner(keeps, other, &has_end, &until);
     const bool moves = dr_controller_due(&controller, &other);
     sooner(moves, other, &has_end, &until);
-    const bool keeps = dr_keep_step(&keep, &controller, now, &other);
-    sooner(keeps, other, &has_end, &until);
     dr_port_wait(has_end, until);
 }
 

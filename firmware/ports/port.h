@@ -36,9 +36,13 @@ void dr_port_open(uint32_t baud);
  * up to 20 us. */
 dr_us dr_port_now_us(void);
 
-/* Sleeps until `until`, or for ever without one; or does nothing at all. Returns earlier when a byte has arrived or when
+/* Sleeps until `until`, or for ever without one. Returns earlier when a byte has arrived or when
  * the line takes more bytes, and whenever it likes, at least once a minute. Must not oversleep by more than 50 us. */
 void dr_port_wait(bool has_end, dr_us until);
+
+/* False: dr_port_wait() does nothing at all, and is not called. When something will happen next is then not computed
+ * either, which takes an AVR a quarter of a streamed frame's time. */
+bool dr_port_waits(void);
 
 /* -- The line ------------------------------------------------------------------------------------------------------ */
 

@@ -96,16 +96,16 @@ class Line(unittest.TestCase):
         targets = [point(0x1000 + v, 0x001000 + 0x100 * (v ^ 0x80) // 16, 0x1000 + (255 - v)) for v in range(256)]
         frames = [frame for target in targets for frame in (b"S\x0f" + target, b"c")]
         # the first has the longest way: give it time
-        events = [(READY_US, frames[0])] + spaced(READY_US + 1_000_000, 40_000, frames[1:])
-        end = events[-1][0] + 40_000
+        events = [(READY_US, frames[0])] + spaced(READY_US + 1_000_000, 15_000, frames[1:])
+        end = events[-1][0] + 15_000
         sent = between(run("trio", events + [(end, "stop")]), READY_US, end)
         self.assertEqual(sent, b"".join(b"\r" + target + b"\x1e\r" for target in targets))
 
     def test_every_byte_value_at_128000_baud(self):
         targets = [point(v, 255 - v, v ^ 0x55) for v in range(256)]
         frames = [frame for target in targets for frame in (b"M" + target, b"C")]
-        events = spaced(READY_US, 20_000, frames)
-        end = events[-1][0] + 20_000
+        events = spaced(READY_US, 10_000, frames)
+        end = events[-1][0] + 10_000
         sent = between(run("mpc", events + [(end, "stop")]), READY_US, end)
         self.assertEqual(sent, b"".join(b"\r\x01" + target + b"\r" for target in targets))
 
@@ -134,7 +134,7 @@ class Stream(unittest.TestCase):
         begin = READY_US + 100_000
         noises = [(begin + 50_000 + i * 10_000, noise) for i in range(60)] if noise else []
         events = [(READY_US, b"O"), (READY_US + 20_000, b"S"), (READY_US + 60_000, bytes([level])), (begin, target), *noises,
-                  *more, (begin + 1_200_000, b"C"), (begin + 1_250_000, "stop")]
+                  *more, (begin + 1_600_000, b"C"), (begin + 1_650_000, "stop")]
         return [(us, byte) for us, byte in run("mpc", sorted(events)) if us >= begin]
 
     def frames(self, sent):
@@ -163,7 +163,9 @@ class Stream(unittest.TestCase):
         self.assertLessEqual(max(late) - min(late), frame_us + (1000 if IS_USB else 0))
 
     def test_at_a_slow_speed_every_micron_is_told(self):
-        sent = self.stream(10)  # 10.7 kB/s; from 12 on a line of 125000 baud is too slow
+        # 10.7 kB/s; from 12 on a line of 125000 baud is too slow. USB has jitter, and the last frame must not find the
+        # one before it still on the line when the move ends: 7.8 kB/s.
+        sent = self.stream(7 if IS_USB else 10)
         frames, rest, _ = self.frames(sent)
         self.assertEqual([x for _, x in frames], [16 * k for k in range(1, 1001)])
         self.assertEqual(rest[:1], b"\r")

@@ -23,7 +23,9 @@ void dr_port_open(uint32_t baud) { Serial.begin(baud); }
 
 dr_us dr_port_now_us(void) { return micros(); }
 
-void dr_port_wait(bool, dr_us) {} /* no board of these runs from a battery */
+/* No board of these runs from a battery. */
+bool dr_port_waits(void) { return false; }
+void dr_port_wait(bool, dr_us) {}
 
 size_t dr_port_read(uint8_t *bytes, size_t room)
 {
@@ -40,10 +42,8 @@ size_t dr_port_room(void) { return Serial.dtr() ? (size_t)Serial.availableForWri
 
 void dr_port_write(const uint8_t *bytes, size_t count)
 {
-    if (count > 0 && Serial.dtr()) {
-        (void)Serial.write(bytes, count);
-        Serial.flush();
-    }
+    if (count > 0 && Serial.dtr())
+        (void)Serial.write(bytes, count); /* Arduino's core sends it with the next frame of USB, within 1 ms */
 }
 
 bool dr_port_has_pace(void) { return false; }

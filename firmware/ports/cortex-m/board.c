@@ -107,6 +107,8 @@ void dr_interrupt_timer(void)
     TIMER_INTERRUPT(0) = 1; /* clears it */
 }
 
+bool dr_port_waits(void) { return true; }
+
 void dr_port_wait(bool has_end, dr_us until)
 {
     const dr_us now = dr_port_now_us();

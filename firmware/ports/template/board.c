@@ -35,7 +35,9 @@ dr_us dr_port_now_us(void)
     return (dr_us)((uint64_t)now.tv_sec * DR_US_PER_S + (uint64_t)now.tv_nsec / 1000u);
 }
 
-/* A chip: set a timer's interrupt for `until` and sleep until any interrupt; or return at once. */
+/* A chip: set a timer's interrupt for `until` and sleep until any interrupt; or false here, and nothing there. */
+bool dr_port_waits(void) { return true; }
+
 void dr_port_wait(bool has_end, dr_us until)
 {
     const dr_us now = dr_port_now_us();
