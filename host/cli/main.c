@@ -1,4 +1,5 @@
-/* dryrig: drives a controller from the command line. Reads the line (options.c), does it by the library, prints (print.c). */
+/* dryrig: drives a controller from the command line. Reads the line (options.c), does it by the library, prints
+ * (print.c). */
 #define _GNU_SOURCE /* sigaction */
 
 #include "options.h"
@@ -9,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* -- Signals: a motion is stopped, not left running ------------------------------------------------------------------------ */
+/* -- Signals: a motion is stopped, not left running ---------------------------------------------------------------- */
 
 static dryrig *volatile moving; /* the controller that a motion command has opened */
 static volatile sig_atomic_t signals, last_signal;
@@ -44,7 +45,7 @@ static void catch_signals(void)
         (void)sigaction(numbers[i], &action, NULL);
 }
 
-/* -- While it moves ----------------------------------------------------------------------------------------------------- */
+/* -- While it moves ------------------------------------------------------------------------------------------------ */
 
 typedef struct {
     const command_line *line;
@@ -74,7 +75,7 @@ static void on_motion(void *context, const dryrig_motion *motion)
     }
 }
 
-/* -- Commands ----------------------------------------------------------------------------------------------------------- */
+/* -- Commands ------------------------------------------------------------------------------------------------------ */
 
 /* X, Y, Z as the library takes them; `um` or `steps` by the options. */
 typedef struct {
@@ -99,7 +100,7 @@ static target read_target(const command_line *line)
     memset(&to, 0, sizeof to);
     const bool is_axis = line->command->id == CMD_AXIS;
     const int axis = is_axis ? axis_of(line) : 0;
-    for (int i = 0; i < (is_axis ? 1 : line->command->argument_count); i++) {
+    for (int i = 0; i < (is_axis ? 1 : DRYRIG_AXES); i++) {
         const char *text = line->argument[is_axis ? 1 : i];
         const char *name = names[is_axis ? axis : i];
         if (line->steps)

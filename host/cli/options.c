@@ -121,14 +121,20 @@ int32_t read_integer(const command_row *command, const char *what, const char *t
     return (int32_t)value;
 }
 
+/* As binary-coded decimals. */
 static unsigned read_firmware(const char *text)
 {
-    unsigned major = 0, minor = 0;
-    int used = 0;
-    if (sscanf(text, "%2u.%2u%n", &major, &minor, &used) != 2 || text[used] != '\0' || strlen(text) < 4 ||
-        text[strlen(text) - 3] != '.' || major == 0)
+    const size_t length = strlen(text), point = length - 3u;
+    bool is_version = length >= 4 && length <= 5 && text[0] != '0';
+    unsigned version = 0;
+    for (size_t i = 0; is_version && i < length; i++) {
+        is_version = i == point ? text[i] == '.' : isdigit((unsigned char)text[i]) != 0;
+        if (i != point)
+            version = version << 4u | (unsigned)(text[i] - '0');
+    }
+    if (!is_version)
         usage_error(NULL, "--firmware must look like 3.21, and is '%s'", text);
-    return (major / 10u << 12u) | (major % 10u << 8u) | (minor / 10u << 4u) | minor % 10u;
+    return version;
 }
 
 static const command_row *find_command(const char *name)

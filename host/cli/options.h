@@ -43,7 +43,8 @@ typedef struct {
 
 enum { EXIT_DONE = 0, EXIT_LINK = 1, EXIT_USAGE = 2, EXIT_SIGNAL = 128 };
 
-/* Reads the command line. Prints help, the version or what is wrong, and ends the program with EXIT_DONE or EXIT_USAGE. */
+/* Reads the command line. Prints help, the version or what is wrong, and ends the program with EXIT_DONE or EXIT_USAGE.
+ * */
 command_line read_command_line(int argc, char **argv);
 /* Prints "dryrig: " and the rest to stderr, with the way to the help, and ends the program with EXIT_USAGE. */
 #if defined(__GNUC__)

@@ -8,7 +8,7 @@
 
 static const char axes[] = "xyz";
 
-/* -- JSON ------------------------------------------------------------------------------------------------------------- */
+/* -- JSON ---------------------------------------------------------------------------------------------------------- */
 
 static cJSON *json_begin(const command_line *line, bool ok)
 {
@@ -41,7 +41,7 @@ static void json_end(cJSON *object)
     (void)fflush(stdout);
 }
 
-/* -- People ----------------------------------------------------------------------------------------------------------- */
+/* -- People -------------------------------------------------------------------------------------------------------- */
 
 static void print_coordinates(const command_line *line, const dryrig_position *position)
 {
@@ -194,7 +194,7 @@ void print_error(const command_line *line, int error, const char *why, const dry
         print_coordinates(line, position);
 }
 
-/* -- Ports ------------------------------------------------------------------------------------------------------------ */
+/* -- Ports --------------------------------------------------------------------------------------------------------- */
 
 static void add_port(void *context, const char *path, const char *description)
 {

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* -- Errors ----------------------------------------------------------------------------------------------------------- */
+/* -- Errors -------------------------------------------------------------------------------------------------------- */
 
 static const struct {
     int error;
@@ -66,7 +66,7 @@ dryrig_fault dryrig_fault_of(int error)
     return i < ERRORS ? errors[i].fault : DRYRIG_FAULT_CALLER;
 }
 
-/* -- Opening ---------------------------------------------------------------------------------------------------------- */
+/* -- Opening ------------------------------------------------------------------------------------------------------- */
 
 dryrig_options dryrig_defaults(dryrig_controller controller)
 {
@@ -190,7 +190,7 @@ int leave(dryrig *d, int result)
     return result;
 }
 
-/* -- Units ------------------------------------------------------------------------------------------------------------ */
+/* -- Units --------------------------------------------------------------------------------------------------------- */
 
 dr_stage_id stage_of(const dryrig *d, int drive)
 {
@@ -326,7 +326,7 @@ int dryrig_get_stage(dryrig_controller controller, const char *name, dryrig_stag
     return DRYRIG_OK;
 }
 
-/* -- Queries ---------------------------------------------------------------------------------------------------------- */
+/* -- Queries ------------------------------------------------------------------------------------------------------- */
 
 static int get_position(dryrig *d, dryrig_position *out)
 {
@@ -351,7 +351,7 @@ static int get_info(dryrig *d, dryrig_info *out)
     memset(out, 0, sizeof *out);
     out->controller = d->kind == DR_TRIO ? DRYRIG_TRIO : DRYRIG_MPC;
     if (d->kind == DR_MPC) {
-        answer active, drives;
+        answer active = {{0}, 0, {0, 0, 0, {0}}}, drives = active;
         int result = need_firmware(d);
         if (result == DRYRIG_OK)
             result = ask(d, DR_OP_MPC_ACTIVE, &active);
@@ -376,7 +376,7 @@ int dryrig_get_info(dryrig *d, dryrig_info *out)
     return result < 0 ? result : leave(d, get_info(d, out));
 }
 
-/* -- Settings --------------------------------------------------------------------------------------------------------- */
+/* -- Settings ------------------------------------------------------------------------------------------------------ */
 
 static int check_setting(dryrig *d, dr_kind kind, const char *what, int value, int first, int last)
 {
@@ -391,12 +391,14 @@ static int set_angle(dryrig *d, int angle_deg)
 {
     int result = check_setting(d, DR_TRIO, "angle", angle_deg, 0, DRYRIG_ANGLE_MAX_DEG);
     const dr_request request = {DR_OP_TRIO_ANGLE, (uint8_t)angle_deg, {0, 0, 0}};
-    answer a;
+    answer a = {{0}, 0, {0, 0, 0, {0}}};
     if (result == DRYRIG_OK)
         result = command(d, &request, &a);
     if (result == DRYRIG_OK)
         result = ask(d, DR_OP_TRIO_POSITION, &a);
-    if (result == DRYRIG_OK && a.reply.value != angle_deg)
+    if (result < 0)
+        return result;
+    if (a.reply.value != angle_deg)
         result =
             fail(d, DRYRIG_ERR_REFUSED, "the angle is %u degrees after it was set to %d", a.reply.value, angle_deg);
     return result;
@@ -412,7 +414,7 @@ static int select_drive(dryrig *d, int drive)
 {
     int result = check_setting(d, DR_MPC, "drive", drive, 1, DRYRIG_DRIVES);
     const dr_request request = {DR_OP_MPC_SELECT, (uint8_t)drive, {0, 0, 0}};
-    answer a;
+    answer a = {{0}, 0, {0, 0, 0, {0}}};
     if (result == DRYRIG_OK)
         result = command(d, &request, &a);
     /* Up to 1.05 the answer does not tell whether there is such a drive, and a late CR may pass for it: so, ask. */

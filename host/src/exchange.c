@@ -23,7 +23,7 @@ int fail(dryrig *d, int error, const char *format, ...)
 
 uint64_t now_us(const dryrig *d) { return d->link.now_us(d->link.context); }
 
-/* -- The line --------------------------------------------------------------------------------------------------------- */
+/* -- The line ------------------------------------------------------------------------------------------------------ */
 
 static int lost(dryrig *d)
 {
@@ -97,7 +97,7 @@ int send_interrupt(dryrig *d)
     return write_out(d, frame, dr_wire_put_request(d->kind, d->firmware, &stop, frame));
 }
 
-/* -- Answers ---------------------------------------------------------------------------------------------------------- */
+/* -- Answers ------------------------------------------------------------------------------------------------------- */
 
 /* How many bytes an answer has that begins with these. */
 static size_t answer_wants(const dryrig *d, const dr_command *row, const uint8_t *bytes, size_t count)
@@ -114,8 +114,8 @@ static size_t answer_wants(const dryrig *d, const dr_command *row, const uint8_t
     }
 }
 
-/* Some firmware leaves the drive out of a position [P, position-13]. Thirteen bytes may also be fourteen of which one was
- * lost: but then, unless it was the drive, the first is a drive's number. */
+/* Some firmware leaves the drive out of a position [P, position-13]. Thirteen bytes may also be fourteen of which one
+ * was lost: but then, unless it was the drive, the first is a drive's number. */
 static bool is_position_13(dryrig *d, const uint8_t *bytes, size_t count)
 {
     if (count != 13 || bytes[12] != DR_CR || d->position_bytes == 14)
@@ -159,7 +159,7 @@ static int garbled(dryrig *d, const dr_command *row, const answer *a, const char
 static int exchange(dryrig *d, const dr_request *request, uint32_t quiet_us, answer *a)
 {
     dr_command row;
-    a->count = 0;
+    memset(a, 0, sizeof *a);
     const int sent = send(d, request);
     if (sent < 0)
         return sent;
@@ -195,7 +195,7 @@ static int exchange(dryrig *d, const dr_request *request, uint32_t quiet_us, ans
     return DRYRIG_OK;
 }
 
-/* -- Getting in step ---------------------------------------------------------------------------------------------------- */
+/* -- Getting in step ----------------------------------------------------------------------------------------------- */
 
 static dr_op position_op(const dryrig *d) { return d->kind == DR_TRIO ? DR_OP_TRIO_POSITION : DR_OP_MPC_POSITION; }
 
@@ -287,6 +287,7 @@ int ask(dryrig *d, dr_op op, answer *out)
 {
     const dr_request query = {(uint8_t)op, 0, {0, 0, 0}};
     answer before;
+    memset(out, 0, sizeof *out);
     int result = command(d, &query, out);
     for (int tries = 0; result == DRYRIG_OK && !d->ask_once && tries < 4; tries++) {
         before = *out;

@@ -33,9 +33,10 @@ void link_sleep_us(void *context, uint32_t span_us)
     }
 }
 
-/* -- Ports in use ----------------------------------------------------------------------------------------------------- */
+/* -- Ports in use -------------------------------------------------------------------------------------------------- */
 
-/* A lock that ends with the process, however it ends. TIOCEXCL would outlive us on a PTY that the emulator keeps open. */
+/* A lock that ends with the process, however it ends. TIOCEXCL would outlive us on a PTY that the emulator keeps open.
+ * */
 int link_lock(int fd) { return flock(fd, LOCK_EX | LOCK_NB) == 0 ? DRYRIG_OK : DRYRIG_ERR_PORT_BUSY; }
 
 static bool has_open(const char *pid, const struct stat *port)
@@ -121,7 +122,7 @@ int link_busy(const char *path, char *why, size_t room)
     return DRYRIG_ERR_PORT_BUSY;
 }
 
-/* -- Opening ---------------------------------------------------------------------------------------------------------- */
+/* -- Opening ------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
     char *text;

@@ -11,7 +11,8 @@ int link_serial_open(dryrig_link *out, const char *path, unsigned baud, char *wh
 /* A PTY, which libserialport refuses: it has no modem lines and is not listed in /sys/class/tty. */
 int link_pty_open(dryrig_link *out, const char *path, unsigned baud, char *why, size_t room);
 
-/* What to wait for with poll(), for who reads and writes without link->read and link->write. -1: not one of these links. */
+/* What to wait for with poll(), for who reads and writes without link->read and link->write. -1: not one of these
+ * links. */
 int link_descriptor(const dryrig_link *link);
 int link_pty_descriptor(const dryrig_link *link);
 int link_serial_descriptor(const dryrig_link *link);

@@ -1,5 +1,5 @@
-/* A PTY, by the kernel's own terminal interface: it takes any baud rate as a number (128000 is no constant of termios), so
- * that whoever looks at the other end can tell that it is right. It has no effect on the pace. */
+/* A PTY, by the kernel's own terminal interface: it takes any baud rate as a number (128000 is no constant of termios),
+ * so that whoever looks at the other end can tell that it is right. It has no effect on the pace. */
 #define _GNU_SOURCE /* O_CLOEXEC, ppoll */
 
 #include "link.h"
@@ -10,12 +10,13 @@
 #include <poll.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <time.h>
 #include <unistd.h>
 
-static int fd_of(void *context) { return (int)(intptr_t)context; }
+static int fd_of(void *context) { return *(const int *)context; }
 
 /* 1: ready; 0: not in time, or a signal came; or LINK. */
 static int wait_for(int fd, short events, uint32_t timeout_us)
@@ -59,7 +60,11 @@ static int pty_write(void *context, const void *bytes, size_t count)
 
 static int pty_purge(void *context) { return ioctl(fd_of(context), TCFLSH, TCIFLUSH) == 0 ? 0 : DRYRIG_ERR_LINK; }
 
-static void pty_close(void *context) { (void)close(fd_of(context)); }
+static void pty_close(void *context)
+{
+    (void)close(fd_of(context));
+    free(context);
+}
 
 int link_pty_descriptor(const dryrig_link *link) { return link->close == pty_close ? fd_of(link->context) : -1; }
 
@@ -95,10 +100,12 @@ int link_pty_open(dryrig_link *out, const char *path, unsigned baud, char *why, 
         (void)snprintf(why, room, "%.200s: cannot set the line: %s", path, strerror(errno));
         result = DRYRIG_ERR_PORT;
     }
-    if (result != DRYRIG_OK) {
+    int *context = result == DRYRIG_OK ? malloc(sizeof *context) : NULL;
+    if (context == NULL) {
         (void)close(fd);
-        return result;
+        return result < 0 ? result : DRYRIG_ERR_MEMORY;
     }
-    *out = (dryrig_link){(void *)(intptr_t)fd, pty_read, pty_write, pty_purge, link_now_us, link_sleep_us, pty_close};
+    *context = fd;
+    *out = (dryrig_link){context, pty_read, pty_write, pty_purge, link_now_us, link_sleep_us, pty_close};
     return DRYRIG_OK;
 }

@@ -1,8 +1,8 @@
 /* Motions: how long they may last, waiting for their end, streamed frames, and whether they arrived.
  *
- * A CR alone proves nothing: it may be a late one of an older command, or line noise. A motion is over when a CR came and
- * the stage stands, and it has succeeded when it stands at its target. A CR that comes long before the motion can be over
- * is followed by more listening. */
+ * A CR alone proves nothing: it may be a late one of an older command, or line noise. A motion is over when a CR came
+ * and the stage stands, and it has succeeded when it stands at its target. A CR that comes long before the motion can
+ * be over is followed by more listening. */
 #include "session.h"
 
 #include "dr_words.h" /* dr_words_controller */
@@ -23,7 +23,7 @@
 
 enum { IDLE, STOPPABLE, UNSTOPPABLE }; /* dryrig.stoppable */
 
-/* -- What is asked for -------------------------------------------------------------------------------------------------- */
+/* -- What is asked for --------------------------------------------------------------------------------------------- */
 
 typedef struct {
     dr_request request;
@@ -89,7 +89,7 @@ static dryrig_position nowhere(void)
     return p;
 }
 
-/* -- What comes back: CR, streamed frames, and what real units add ------------------------------------------------------- */
+/* -- What comes back: CR, streamed frames, and what real units add ------------------------------------------------- */
 
 typedef struct {
     uint64_t began_us, heard_us, watched_us, stopped_us;
@@ -177,7 +177,7 @@ static bool give_up_frame(watch *w)
     return ended;
 }
 
-/* -- Waiting ------------------------------------------------------------------------------------------------------------ */
+/* -- Waiting ------------------------------------------------------------------------------------------------------- */
 
 static bool interrupt_is_wanted(dryrig *d) { return __atomic_load_n(&d->interrupted, __ATOMIC_SEQ_CST) != 0; }
 
@@ -234,7 +234,7 @@ static int wait_for_end(dryrig *d, const plan *p, watch *w, uint64_t until_us)
     }
 }
 
-/* -- Arrival ------------------------------------------------------------------------------------------------------------ */
+/* -- Arrival ------------------------------------------------------------------------------------------------------- */
 
 static int judge(dryrig *d, const plan *p, const watch *w, const dryrig_position *end)
 {
@@ -341,7 +341,7 @@ static int run(dryrig *d, const plan *p, dryrig_position *end)
     return result;
 }
 
-/* -- Asking for it ------------------------------------------------------------------------------------------------------ */
+/* -- Asking for it ------------------------------------------------------------------------------------------------- */
 
 /* What a public function wants. Targets are copies: a caller may pass one place as target and as end. */
 typedef struct {
@@ -451,7 +451,7 @@ static int set_streaming(dryrig *d, bool on)
     if (d->kind == DR_TRIO || d->streaming == (on ? 1 : 0))
         return DRYRIG_OK;
     const int result = command(d, &request, &a);
-    d->streaming = result == DRYRIG_OK ? (int8_t)on : -1;
+    d->streaming = result < 0 ? -1 : on ? 1 : 0;
     return result;
 }
 
@@ -625,7 +625,7 @@ int dryrig_calibrate(dryrig *d, dryrig_position *end)
 
 int dryrig_centre(dryrig *d, dryrig_position *end) { return move_by_name(d, DR_OP_MPC_CENTRE, DR_OP_MPC_CENTRE, end); }
 
-/* -- Stopping ----------------------------------------------------------------------------------------------------------- */
+/* -- Stopping ------------------------------------------------------------------------------------------------------ */
 
 int dryrig_stop(dryrig *d, dryrig_position *end)
 {

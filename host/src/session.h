@@ -44,7 +44,7 @@ struct dryrig {
     uint64_t busy_us;       /* when the last byte went or came */
     uint8_t drive;          /* MPC: the active one, as last selected or seen; 0: not yet known */
     uint8_t position_bytes; /* MPC: 13 or 14, as learned; 0: not yet known */
-    int8_t streaming;       /* MPC: 1 on, 0 off, -1 not known */
+    int streaming;          /* MPC: 1 on, 0 off, -1 not known */
 
     int interrupted, stoppable; /* atomic: dryrig_interrupt() */
     bool within;                /* a public function is under way */
@@ -53,7 +53,7 @@ struct dryrig {
     char why[DRYRIG_WHY_MAX];
 };
 
-/* -- exchange.c ----------------------------------------------------------------------------------------------------------- */
+/* -- exchange.c ---------------------------------------------------------------------------------------------------- */
 
 /* One answer, whole and valid. */
 typedef struct {
@@ -84,21 +84,21 @@ int ask(dryrig *d, dr_op op, answer *out);
 int settle(dryrig *d, uint32_t spacing_us, dryrig_position *out);
 /* Gets back in step. */
 int resync(dryrig *d);
-/* Sends ^C so many times, every 2 ms. A command that lost bytes takes ^C for data; the next ^C stops the motion that begins
- * then. CANNOT_STOP: no CR came back. */
+/* Sends ^C so many times, every 2 ms. A command that lost bytes takes ^C for data; the next ^C stops the motion that
+ * begins then. CANNOT_STOP: no CR came back. */
 int stop_everything(dryrig *d, size_t times);
 #define STOPS_THAT_END_ALL (DR_FRAME_MAX + 1u)
 /* MPC: makes sure that d->firmware is known, as far as the controller tells it. */
 int need_firmware(dryrig *d);
 
-/* -- dryrig.c -------------------------------------------------------------------------------------------------------------- */
+/* -- dryrig.c ------------------------------------------------------------------------------------------------------ */
 
 /* The stage of a drive (0 on a TRIO); DR_STAGE_NONE: not said. */
 dr_stage_id stage_of(const dryrig *d, int drive);
 dryrig_position to_position(const dryrig *d, const dr_reply *reply);
 /* Refuses what no stage (DR_STAGE_NONE) or not this stage can reach. */
-int check_target(dryrig *d, dr_stage_id stage, const int32_t steps[DRYRIG_AXES]);
-int convert_um(dryrig *d, dr_stage_id stage, const double um[DRYRIG_AXES], int32_t steps[DRYRIG_AXES]);
+int check_target(dryrig *d, dr_stage_id id, const int32_t steps[DRYRIG_AXES]);
+int convert_um(dryrig *d, dr_stage_id id, const double um[DRYRIG_AXES], int32_t steps[DRYRIG_AXES]);
 
 /* Every public function that talks begins and ends with these: no calls from within a callback. */
 int enter(dryrig *d);

@@ -12,7 +12,7 @@ static void die(const char *why)
     exit(3);
 }
 
-/* -- From the controller to the host --------------------------------------------------------------------------------- */
+/* -- From the controller to the host ------------------------------------------------------------------------------- */
 
 static void deliver(core_link *link, uint8_t byte, uint64_t at_us)
 {
@@ -81,7 +81,7 @@ static void advance(core_link *link, uint64_t until_us)
     }
 }
 
-/* -- The link -------------------------------------------------------------------------------------------------------- */
+/* -- The link ------------------------------------------------------------------------------------------------------ */
 
 static int core_read(void *context, void *bytes, size_t room, uint32_t timeout_us)
 {
@@ -171,7 +171,7 @@ dryrig_link core_link_link(core_link *link)
     return (dryrig_link){link, core_read, core_write, core_purge, core_now, core_sleep, core_close};
 }
 
-/* -- For tests ------------------------------------------------------------------------------------------------------- */
+/* -- For tests ----------------------------------------------------------------------------------------------------- */
 
 void core_link_init(core_link *link, dr_kind kind)
 {

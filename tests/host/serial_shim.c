@@ -1,5 +1,6 @@
-/* serial_shim: makes a PTY look like the serial port /dev/ttyEMU0 to one program, so that libserialport, and the library's
- * code on it, runs end to end against the emulator. For tests: LD_PRELOAD, with DRYRIG_SHIM_PTY naming the PTY.
+/* serial_shim: makes a PTY look like the serial port /dev/ttyEMU0 to one program, so that libserialport, and the
+ * library's code on it, runs end to end against the emulator. For tests: LD_PRELOAD, with DRYRIG_SHIM_PTY naming the
+ * PTY.
  *
  * It answers for the port's name where libserialport looks (sysfs, /dev), and for the modem lines that a PTY lacks. */
 #define _GNU_SOURCE
@@ -54,7 +55,7 @@ char *realpath(const char *restrict path, char *restrict resolved)
 {
     char *(*call)(const char *, char *);
     if (strcmp(path, PORT) == 0 && resolved != NULL)
-        return strcpy(resolved, PORT);
+        return memcpy(resolved, PORT, sizeof PORT);
     next("realpath", &call, sizeof call);
     return call(path, resolved);
 }

@@ -1,12 +1,12 @@
-/* The host library against a script: exactly these bytes go out, with these pauses, and these come back. The bytes are typed
- * from the manuals ([T] table 6, [M] table 9), not from the code. */
+/* The host library against a script: exactly these bytes go out, with these pauses, and these come back. The bytes are
+ * typed from the manuals ([T] table 6, [M] table 9), not from the code. */
 #include "dryrig/dryrig.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <unity.h>
 
-/* -- A link that is a script, in virtual time --------------------------------------------------------------------------- */
+/* -- A link that is a script, in virtual time ---------------------------------------------------------------------- */
 
 #define ANY 0xFFFFu /* an answer of any length may follow */
 
@@ -144,7 +144,7 @@ static dryrig *open_script(dryrig_controller controller, const char *stage, cons
 #define FAILS(error, call) TEST_ASSERT_EQUAL_STRING(dryrig_error_name(error), dryrig_error_name(call))
 static void check_played(void) { TEST_ASSERT_EQUAL_size_t_MESSAGE(script.count, script.at, "the script is not over"); }
 
-/* -- What goes over the line ---------------------------------------------------------------------------------------------- */
+/* -- What goes over the line --------------------------------------------------------------------------------------- */
 
 /* Positions as answers. MPC: drive 1; TRIO: 30 degrees. Least significant byte first. */
 #define M_AT_0 "\x01\0\0\0\0\0\0\0\0\0\0\0\0\x0D"
@@ -321,7 +321,7 @@ static void trio_commands(void)
     check_played();
 }
 
-/* -- What does not go over the line ---------------------------------------------------------------------------------------- */
+/* -- What does not go over the line -------------------------------------------------------------------------------- */
 
 static void refused_targets_send_nothing(void)
 {
@@ -399,7 +399,7 @@ static void the_ends_of_travel_are_allowed(void)
     FAILS(DRYRIG_ERR_RANGE, dryrig_um_to_steps(d, 1, end, steps));
 }
 
-/* -- Surprises ---------------------------------------------------------------------------------------------------------------- */
+/* -- Surprises ----------------------------------------------------------------------------------------------------- */
 
 /* The CR of a move that was given up comes when a new move has just begun: it is not taken for that one's. */
 static void the_late_cr_of_an_older_move_is_not_the_new_one_s(void)
@@ -466,7 +466,7 @@ static void ask_once_asks_once(void)
     check_played();
 }
 
-/* -- Opening and errors ------------------------------------------------------------------------------------------------------- */
+/* -- Opening and errors -------------------------------------------------------------------------------------------- */
 
 static void impossible_options(void)
 {

@@ -68,7 +68,7 @@ static void check_at(const dryrig_position *p, int32_t x, int32_t y, int32_t z)
     TEST_ASSERT_EQUAL_INT32_ARRAY(steps, truth, 3);
 }
 
-/* -- Every command ---------------------------------------------------------------------------------------------------- */
+/* -- Every command ------------------------------------------------------------------------------------------------- */
 
 static void every_command_of_the_trio(void)
 {
@@ -240,7 +240,7 @@ static void a_target_may_be_the_place_for_the_end(void)
     check_at(&p, 11667, 10667, 10987);
 }
 
-/* -- Streaming ---------------------------------------------------------------------------------------------------------- */
+/* -- Streaming ----------------------------------------------------------------------------------------------------- */
 
 static struct {
     unsigned count, progress;
@@ -317,7 +317,7 @@ static void streaming_left_on(void)
     check_in_step();
 }
 
-/* -- Interrupts ---------------------------------------------------------------------------------------------------------- */
+/* -- Interrupts ---------------------------------------------------------------------------------------------------- */
 
 static void interrupt(core_link *l) { (void)dryrig_interrupt(l->d); }
 
@@ -368,8 +368,8 @@ static void an_interrupt_that_is_answered_with_an_i(void)
     sweep_interrupts(DR_MPC, true, INSTRUMENT_STOP_SAYS_I, 0, 800000, 20011);
 }
 
-/* The race: the motion ends just before, while and just after ^C is under way. 12,000 steps of 1/16 um at 1,300 um/s take
- * 576,924 us; the command is sent within 100 ms. */
+/* The race: the motion ends just before, while and just after ^C is under way. 12,000 steps of 1/16 um at 1,300 um/s
+ * take 576,924 us; the command is sent within 100 ms. */
 static void an_interrupt_that_meets_the_end(void) { sweep_interrupts(DR_MPC, false, 0, 600000, 680000, 97); }
 
 static void an_interrupt_stops_every_mpc_motion(void)
@@ -477,7 +477,7 @@ static void a_trio_in_another_motion_does_not_answer_stop(void)
     check_in_step();
 }
 
-/* -- Quirks of real units [P] ------------------------------------------------------------------------------------------- */
+/* -- Quirks of real units [P] -------------------------------------------------------------------------------------- */
 
 static void small_move_silent(void)
 {
@@ -650,7 +650,7 @@ static void a_trio_axis_that_stands_at_0_and_90_degrees(void)
     OK(dryrig_move_steps(d, target, DRYRIG_ORDER_HOME, &p));
 }
 
-/* -- Silence -------------------------------------------------------------------------------------------------------------- */
+/* -- Silence ------------------------------------------------------------------------------------------------------- */
 
 static void a_controller_that_is_off(void)
 {
@@ -735,9 +735,10 @@ static void a_port_that_goes(void)
     d = NULL;
 }
 
-/* -- A spoiled line: each byte, each way ----------------------------------------------------------------------------------- *
- * Whatever one fault does, no call may succeed with a position that is not the true one, every call ends, and afterwards
- * the handle gets back in step by itself (but for a TRIO whose command was torn: then by dryrig_resync()). */
+/* -- A spoiled line: each byte, each way ---------------------------------------------------------------------------- *
+ * Whatever one fault does, no call may succeed with a position that is not the true one, every call ends, and
+ * afterwards the handle gets back in step by itself (but for a TRIO whose command was torn: then by dryrig_resync()).
+ * */
 
 static core_fate fate_of_target;
 static uint8_t corruption;

@@ -1,5 +1,6 @@
-"""What `cmake --install` leaves behind: another project uses it in three lines, by CMake and by pkg-config; static and shared."""
+"""What `cmake --install` leaves: another project uses it in three lines, by CMake and by pkg-config; static, shared."""
 import os
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -31,19 +32,20 @@ class Install(unittest.TestCase):
             sh("cmake", "--install", build, "--prefix", prefix)
             moved = f"{folder}/elsewhere"  # the installed tree may be moved
             os.rename(prefix, moved)
-            files = {os.path.relpath(os.path.join(at, name), moved) for at, _, names in os.walk(moved) for name in names}
+            files = {os.path.relpath(os.path.join(at, name), moved)
+                     for at, _, names in os.walk(moved) for name in names}
             for name in ("bin/dryrig", "include/dryrig/dryrig.h", "share/man/man1/dryrig.1", "share/man/man3/dryrig.3"):
                 self.assertIn(name, files)
             self.assertEqual(["dryrig.h"], sorted(os.path.basename(name) for name in files if name.endswith(".h")))
             library = next(os.path.dirname(name) for name in files if os.path.basename(name).startswith("libdryrig."))
-            env = {**os.environ, "LD_LIBRARY_PATH": f"{moved}/{library}", "PKG_CONFIG_PATH": f"{moved}/{library}/pkgconfig"}
+            env = {**os.environ, "LD_LIBRARY_PATH": f"{moved}/{library}",
+                   "PKG_CONFIG_PATH": f"{moved}/{library}/pkgconfig"}
             self.assertRegex(sh(f"{moved}/bin/dryrig", "--version", env=env), "^dryrig ")
 
             os.mkdir(project)
             with open(f"{project}/CMakeLists.txt", "w", encoding="ascii") as file:
                 file.write(CMAKE)
-            with open(CONSUMER, encoding="ascii") as source, open(f"{project}/consumer.c", "w", encoding="ascii") as file:
-                file.write(source.read())
+            shutil.copy(CONSUMER, f"{project}/consumer.c")
             sh("cmake", "-S", project, "-B", f"{project}/build", f"-DCMAKE_PREFIX_PATH={moved}")
             sh("cmake", "--build", f"{project}/build")
             self.assertEqual("no-port\n", sh(f"{project}/build/consumer", env=env))

@@ -1,4 +1,4 @@
-"""dryrig and the examples, against dryrig-emu on real PTYs: every command of both controllers, errors, signals, ports."""
+"""dryrig and the examples, against dryrig-emu on PTYs: every command of both controllers, errors, signals, ports."""
 import json
 import os
 import pty
@@ -27,8 +27,10 @@ class Rig:
     """An emulator, and dryrig's options for it."""
 
     def __init__(self, kind, stage, *args):
-        self.process = subprocess.Popen([EMULATOR, kind, "--device", stage, *args], stdin=subprocess.DEVNULL,
-                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        self.folder = tempfile.TemporaryDirectory()
+        self.trace = f"{self.folder.name}/trace"
+        self.process = subprocess.Popen([EMULATOR, kind, "--device", stage, "--trace", self.trace, *args],
+                                        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         self.path = self.process.stdout.readline().removeprefix("ready ").strip()
         self.options = ["--port", self.path, "--controller", kind, "--stage", stage]
 
@@ -41,6 +43,17 @@ class Rig:
     def stop(self):
         self.process.terminate()
         self.process.communicate(timeout=LIMIT_S)
+        self.folder.cleanup()
+
+    def wait_for_request(self, code):
+        """Until the emulator has got a command that begins with this byte."""
+        deadline = time.monotonic() + LIMIT_S
+        while time.monotonic() < deadline:
+            with open(self.trace, encoding="utf-8") as trace:
+                if any(re.match(rf" *[0-9.]+ > {code:02X}", line) for line in trace):
+                    return
+            time.sleep(0.02)
+        raise AssertionError("no such command came")
 
     def run(self, *args, expect=0):
         status, out, err = run(*self.options, *args)
@@ -100,7 +113,8 @@ class Commands(unittest.TestCase):
             self.assertEqual("x 5000  y 6000  z 7000 steps  angle 45 degrees\n", rig.run("work", "--steps"))
             rig.run("calibrate")
             rig.run("stop")
-            for words in (["angle", "91"], ["select", "1"], ["mode", "1"], ["line", "1", "1", "1", "--speed", "3", "--stream"]):
+            for words in (["angle", "91"], ["select", "1"], ["mode", "1"],
+                          ["line", "1", "1", "1", "--speed", "3", "--stream"]):
                 rig.run(*words, expect=2)
 
     def test_refused_targets(self):
@@ -135,7 +149,8 @@ class Commands(unittest.TestCase):
             self.assertEqual((1, True), (status, "manipulator" in err))
 
     def test_observed_quirks(self):
-        with Rig("mpc", "MP-225", "--quirks", "observed,position-13,stop-says-i,nul-heartbeat", "--position", "320,0,0") as rig:
+        quirks = "observed,position-13,stop-says-i,nul-heartbeat"
+        with Rig("mpc", "MP-225", "--quirks", quirks, "--position", "320,0,0") as rig:
             rig.run("--steps", "move", "2000", "2000", "2000")
             self.assertIn("under 16 steps", rig.run("--steps", "move", "2015", "2000", "2000", expect=1))
             rig.run("--steps", "line", "1000", "0", "7", "--speed", "15")
@@ -159,7 +174,7 @@ class Usage(unittest.TestCase):
                             (["-c", "mpc", "-p", "x", "-s", "MP-225", "axis", "w", "1"], "x, y, z"),
                             (["-c", "mpc", "-p", "x", "-s", "MP-225", "line", "1", "2", "3"], "--speed"),
                             (["-c", "mpc", "-p", "x", "-s", "MP-225", "home", "--speed", "3"], "'line'"),
-                            (["-c", "mpc", "-p", "x", "-s", "MP-225", "move", "1", "2", "3", "--order", "up"], "home or work"),
+                            (["-c", "mpc", "-p", "x", "--steps", "move", "1", "2", "3", "--order", "up"], "or work"),
                             (["-c", "mpc", "-p", "x", "--firmware", "3.2", "home"], "3.21"),
                             (["-c", "mpc", "-p", "x", "--baud", "0", "home"], "--baud"),
                             (["--wrong"], "--wrong")):
@@ -245,7 +260,8 @@ class Ports(Starting):
         for kind, stage in (("mpc", "MP-225"), ("trio", "MP-845")):
             with Rig(kind, stage, "--speedup", "50") as rig:
                 asan = os.environ.get("ASAN_OPTIONS", "")
-                env = {"LD_PRELOAD": SHIM, "DRYRIG_SHIM_PTY": rig.path, "ASAN_OPTIONS": f"{asan}:verify_asan_link_order=0"}
+                env = {"LD_PRELOAD": SHIM, "DRYRIG_SHIM_PTY": rig.path,
+                       "ASAN_OPTIONS": f"{asan}:verify_asan_link_order=0"}
                 options = ["-p", "/dev/ttyEMU0", "-c", kind, "-s", stage]
                 self.assertEqual(1, run(*options, "position")[0])  # without the shim there is no such port
                 for words in (["info"], ["move", "300", "300", "300"], ["line", "150", "300", "300", "--speed", "15"],
@@ -266,7 +282,7 @@ class Signals(Starting):
         if "--stream" in args:
             mover.stdout.readline()  # it moves
         else:
-            time.sleep(1)
+            rig.wait_for_request(ord("S"))
         mover.send_signal(how)
         out, err = mover.communicate(timeout=LIMIT_S)
         return mover.returncode, json.loads(out.decode().splitlines()[-1]), err.decode()
@@ -274,14 +290,15 @@ class Signals(Starting):
     def test_sigint_stops_a_stream_and_says_where(self):
         for ignored in (False, True):
             with Rig("mpc", "MP-225") as rig:
-                status, row, err = self.stop_a_line(rig, "line", "20000", "0", "0", "--speed", "5", "--stream", ignored=ignored)
+                status, row, err = self.stop_a_line(rig, "line", "20000", "0", "0", "--speed", "5", "--stream",
+                                                    ignored=ignored)
                 self.assertEqual((130, "interrupted"), (status, row["error"]), err)
                 self.assertTrue(0 < row["position"]["steps"][0] < 320000)
                 self.assertEqual(row["position"]["steps"], rig.steps())
 
     def test_sigterm_stops_a_trio_line(self):
         with Rig("trio", "MP-845") as rig:
-            status, row, err = self.stop_a_line(rig, "line", "20000", "1000", "1000", "--speed", "0", how=signal.SIGTERM)
+            status, row, err = self.stop_a_line(rig, "line", "20000", "999", "999", "--speed", "0", how=signal.SIGTERM)
             self.assertEqual((143, "interrupted"), (status, row["error"]), err)
             self.assertEqual(row["position"]["steps"], rig.steps())
 
@@ -289,7 +306,7 @@ class Signals(Starting):
         with Rig("trio", "MP-845") as rig:
             mover = self.start([DRYRIG, *rig.options, "move", "9000", "9000", "9000"], stdout=subprocess.PIPE,
                                      stderr=subprocess.PIPE)
-            time.sleep(1)
+            rig.wait_for_request(ord("W"))
             mover.send_signal(signal.SIGINT)
             out, err = mover.communicate(timeout=LIMIT_S)
             self.assertEqual(130, mover.returncode)
@@ -299,7 +316,8 @@ class Signals(Starting):
     def test_progress_on_a_terminal(self):
         with Rig("mpc", "MP-225") as rig:
             parent, child = pty.openpty()
-            mover = self.start([DRYRIG, *rig.options, "move", "3000", "0", "0"], stdout=subprocess.DEVNULL, stderr=child)
+            mover = self.start([DRYRIG, *rig.options, "move", "3000", "0", "0"], stdout=subprocess.DEVNULL,
+                               stderr=child)
             os.close(child)
             seen = b""
             while select.select([parent], [], [], LIMIT_S)[0]:
