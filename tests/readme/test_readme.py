@@ -1,0 +1,92 @@
+"""README.md is true: its programs compile and run, its commands work, its links and options exist.
+
+    test_readme.py REPOSITORY BUILD-DIRECTORY COMPILER [FLAG...]"""
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT, BUILD, COMPILER, *FLAGS = sys.argv[1:]
+with open(os.path.join(ROOT, "README.md"), encoding="utf-8") as file:
+    README = file.read()
+
+
+def blocks(language):
+    found = re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+    assert found, f"README.md has no {language} any more"
+    return found
+
+
+class Readme(unittest.TestCase):
+    """Each test has emulators of its own at links of its own, in place of those that README.md names."""
+
+    def setUp(self):
+        self.directory = tempfile.TemporaryDirectory()
+        self.addCleanup(self.directory.cleanup)
+        for controller in ("mpc", "trio"):
+            emulator = subprocess.Popen(
+                [f"{BUILD}/emulator/dryrig-emu", controller, "--link", self.path(controller), "--speedup", "20"],
+                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+            self.addCleanup(self.stop, emulator)
+            self.assertRegex(emulator.stdout.readline(), r"^ready /dev/pts/\d+\n$")
+
+    @staticmethod
+    def stop(emulator):
+        emulator.terminate()
+        emulator.communicate(timeout=20)
+
+    def path(self, name):
+        return os.path.join(self.directory.name, name)
+
+    def here(self, text):
+        return text.replace("/tmp/mpc", self.path("mpc")).replace("/tmp/trio", self.path("trio")).replace("$PWD/build", BUILD)
+
+    def run_here(self, *command):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=self.directory.name)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        return done.stdout
+
+    def test_commands(self):
+        self.run_here("sh", "-ec", self.here("\n".join(blocks("sh"))))
+
+    def test_python(self):
+        for program in blocks("python"):
+            self.assertEqual(self.run_here(sys.executable, "-c", self.here(program)), "drive 1 is at 1000.0 500.0 300.0 um\n")
+
+    def test_c(self):
+        libraries = subprocess.run(["pkg-config", "--libs", "libserialport"], capture_output=True, text=True, check=True)
+        for program in blocks("c"):
+            with open(self.path("example.c"), "w", encoding="utf-8") as source:
+                source.write(self.here(program))
+            self.run_here(COMPILER, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *FLAGS, f"-I{ROOT}/host/include",
+                          self.path("example.c"), f"{BUILD}/host/libdryrig.a", *libraries.stdout.split(), "-o", self.path("example"))
+            self.assertEqual(self.run_here(self.path("example")), "at 1000.000 2000.000 500.000 um\n")
+
+
+class Words(unittest.TestCase):
+    def test_links_lead_somewhere(self):
+        for target in re.findall(r"\]\(([^)#:]+)\)", README):
+            self.assertTrue(os.path.exists(os.path.join(ROOT, target)), target)
+
+    def test_options_exist(self):
+        programs = [f"{BUILD}/emulator/dryrig-emu", f"{BUILD}/host/dryrig"]
+        known = "".join(subprocess.run([p, "--help"], capture_output=True, text=True, check=True).stdout for p in programs)
+        others = {"--build", "--install", "--cflags", "--libs"}  # of CMake and pkg-config
+        for option in set(re.findall(r"(?<![\w-])--[a-z]+", README)) - others:
+            self.assertRegex(known, rf"{option}\b")
+
+    def test_emulators_start_as_told(self):
+        for line in re.findall(r"^    (dryrig-emu .*)$", README, re.MULTILINE):
+            emulator = subprocess.Popen([f"{BUILD}/emulator/dryrig-emu", *line.split()[1:]], stdout=subprocess.PIPE,
+                                        stderr=subprocess.DEVNULL, text=True)
+            try:
+                self.assertTrue(emulator.stdout.readline().startswith("ready"), line)
+            finally:
+                emulator.kill()
+                emulator.communicate()
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
