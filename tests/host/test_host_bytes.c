@@ -31,6 +31,8 @@ static struct {
     size_t answer_count;
     unsigned purges, closes, writes;
     bool purged, babbles;
+    bool has_second;
+    uint32_t second_us; /* after the answer to ^C comes another CR, so much later; 0: none */
 } script;
 
 static int script_read(void *context, void *bytes, size_t room, uint32_t timeout_us)
@@ -43,6 +45,12 @@ static int script_read(void *context, void *bytes, size_t room, uint32_t timeout
         script.answer += count;
         script.answer_count -= count;
         script.quiet_us = script.now_us;
+        if (script.has_second && script.answer_count == 0) {
+            script.has_second = false;
+            script.answer = "\x0D";
+            script.answer_count = 1;
+            script.answer_us = script.now_us + script.second_us;
+        }
         return (int)count;
     }
     script.now_us += script.babbles && timeout_us > 10000 ? 10000 : timeout_us;
@@ -60,7 +68,9 @@ static int script_write(void *context, const void *bytes, size_t count)
     const uint64_t pause_us = script.now_us - script.quiet_us;
     TEST_ASSERT_LESS_OR_EQUAL_size_t(l->sent_count - script.sent_at, count);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(l->sent + script.sent_at, bytes, count);
-    if (script.sent_at == 0) {
+    if (l->sent[0] == 0x03)
+        TEST_ASSERT_FALSE_MESSAGE(script.purged, "^C must not throw away what the move has said");
+    else if (script.sent_at == 0) {
         TEST_ASSERT_TRUE_MESSAGE(script.purged, "buffers are purged before every command [T note 3, M note 3]");
         TEST_ASSERT_TRUE_MESSAGE(script.writes == 1 || pause_us >= 2000, "2 ms between commands [T note 2, M note 2]");
     } else
@@ -74,6 +84,7 @@ static int script_write(void *context, const void *bytes, size_t count)
         script.answer_us = script.now_us + l->after_us;
         script.sent_at = 0;
         script.at++;
+        script.has_second = l->sent[0] == 0x03 && script.second_us != 0;
     }
     return 0;
 }
@@ -419,6 +430,44 @@ static void the_late_cr_of_an_older_move_is_not_the_new_one_s(void)
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(208334, script.now_us - began_us); /* an early CR is not believed */
 }
 
+/* Bytes that nobody asked for, between two commands: a late CR, STOP on the ROE ('I'). The next answer could be shifted by
+ * more of them, so the line is looked into first. */
+static void bytes_that_nobody_asked_for_raise_doubt(void)
+{
+    static const line lines[] = {IN_STEP(M_AT_0), ASKED(M_AT_0), IN_STEP(M_AT_0), ASKED(M_AT_0)};
+    dryrig_position p;
+    OPEN(DRYRIG_MPC, "MP-225", lines);
+    OK(dryrig_get_position(d, &p));
+    script.answer = "\x0D";
+    script.answer_count = 1;
+    script.answer_us = script.now_us;
+    OK(dryrig_get_position(d, &p));
+    check_played();
+}
+
+static void press_stop(void *context, const dryrig_motion *motion)
+{
+    (void)context;
+    (void)motion;
+    OK(dryrig_interrupt(d));
+}
+
+/* The move ended just before ^C came: its CR, and 16 ms later (a USB adapter holds it back) that of the idle ^C. Nothing is
+ * asked in between. */
+static void two_crs_after_an_interrupt(void)
+{
+    static const line lines[] = {
+        IN_STEP(M_AT_0),           ASKED(M_AT_0),           LINE("M\x10\x27\0\0\0\0\0\0\0\0\0\0", "", 0),
+        LINE("\x03", "\x0D", 200), LINE("C", M_AT_1, 1300), LINE("C", M_AT_1, 1300),
+        LINE("C", M_AT_1, 1300),   LINE("C", M_AT_1, 1300)};
+    const int32_t target[3] = {10000, 0, 0};
+    OPEN(DRYRIG_MPC, "MP-225", lines);
+    script.second_us = 16000;
+    dryrig_watch(d, press_stop, NULL);
+    FAILS(DRYRIG_ERR_INTERRUPTED, dryrig_move_steps(d, target, DRYRIG_ORDER_AUTO, NULL));
+    TEST_ASSERT_EQUAL_size_t(8, script.at); /* no more: it was never in doubt */
+}
+
 static void wrong_answers_are_refused_and_asked_again(void)
 {
     static const line lines[] = {
@@ -540,6 +589,8 @@ int main(void)
     RUN_TEST(the_travel_is_that_of_the_active_drive);
     RUN_TEST(the_ends_of_travel_are_allowed);
     RUN_TEST(the_late_cr_of_an_older_move_is_not_the_new_one_s);
+    RUN_TEST(bytes_that_nobody_asked_for_raise_doubt);
+    RUN_TEST(two_crs_after_an_interrupt);
     RUN_TEST(wrong_answers_are_refused_and_asked_again);
     RUN_TEST(a_controller_that_keeps_talking);
     RUN_TEST(ask_once_asks_once);

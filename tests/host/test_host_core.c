@@ -579,6 +579,33 @@ static void a_unit_that_boots(void)
     check_in_step();
 }
 
+static void stray_cr(core_link *l)
+{
+    l->inbox[l->first].at_us = l->now_us;
+    l->inbox[l->first].byte = 0x0D;
+    l->count = 1;
+}
+
+/* 20,000 steps take 416,667 us. A CR long before is not believed, and nothing is asked while it moves; one shortly before
+ * is looked into. Either way the end is the true one. */
+static void a_stray_cr_does_not_end_a_move(void)
+{
+    const int32_t target[3] = {20000, 0, 0};
+    for (uint64_t at_us = 1000; at_us < 400000; at_us += 7001) {
+        dryrig_position p;
+        begin(DR_MPC);
+        OK(dryrig_get_position(d, &p));
+        link->event_us = link->now_us + 40000 + at_us; /* asking where it stands takes less */
+        link->event = stray_cr;
+        OK(dryrig_move_steps(d, target, DRYRIG_ORDER_AUTO, &p));
+        check_at(&p, 20000, 0, 0);
+        if (at_us < 100000)
+            TEST_ASSERT_EQUAL_UINT(0, core_link_breaches(link));
+        check_in_step();
+        tearDown();
+    }
+}
+
 /* Some firmware resumes a stopped move in place of the next one. */
 static void pause_on_stop_is_noticed(void)
 {
@@ -900,6 +927,7 @@ int main(void)
     RUN_TEST(quirks_that_change_nothing_for_us);
     RUN_TEST(position_13_is_told_from_a_loss);
     RUN_TEST(a_unit_that_boots);
+    RUN_TEST(a_stray_cr_does_not_end_a_move);
     RUN_TEST(pause_on_stop_is_noticed);
     RUN_TEST(stop_on_the_roe_that_says_i);
     RUN_TEST(another_drive_was_selected_by_hand);
