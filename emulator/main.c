@@ -1,216 +1,214 @@
-/* dryrig-emu: a controller on a pseudo-terminal.
+/* dryrig-emu: controllers on pseudo-terminals.
  *
- *     options -> instrument (controller, quirks of bytes, paced line) <-> pty <-> a host program
- *                    |                                               link: its stable name
- *                  trace
- *
- * One loop: sleep until the port, a signal or the instrument's next instant; bring the instrument to the present; pass bytes
- * on. Between events nothing runs. */
-#define _GNU_SOURCE     /* epoll, inotify, ppoll, signalfd */
-#include "instrument.h" /* the controller as the host sees it */
-#include "link.h"       /* the stable name */
-#include "options.h"    /* what was asked for */
-#include "pty.h"        /* the port */
-#include "trace.h"      /* what happens, in words */
+ *     options -> rig: setups of controllers -> stations: instrument (controller, quirks of bytes, paced line) <-> pty
+ *                                                 |                                    link: its stable name
+ *                                             observers: trace, ...
+ *     engine: the loop and the clock            control: commands while it runs      child: the command of `run`
+ */
+#define _GNU_SOURCE  /* signalfd, mkdtemp */
+#include "child.h"   /* the command of `run` */
+#include "engine.h"  /* the loop */
+#include "options.h" /* what was asked for */
+#include "trace.h"   /* what happens, in words */
 
 #include "dr_words.h" /* names for people */
 
 #include <errno.h>
 #include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
-#include <sys/inotify.h>
-#include <sys/prctl.h>
 #include <sys/signalfd.h>
-#include <time.h>
 #include <unistd.h>
 
-#define NS_PER_US UINT64_C(1000)
-#define NS_PER_S UINT64_C(1000000000)
-#define CHUNK 64u /* bytes that leave at one instant, at most: a reply and what was kept behind it */
-#define ROOM_WORTH_READING (INSTRUMENT_LINE_MAX / 2u)
+#define PATH_ROOM 512u
 
 typedef struct {
-    instrument ins;
-    pty port;
+    source signals; /* the first, see on_signal() */
+    options *o;
+    engine e;
     trace trace;
-    bool has_unread;  /* the kernel holds bytes that the line had no room for */
-    bool wants_write; /* waits for the host to read */
-    bool told_loss;
-    uint64_t read_ns; /* when the host's last bytes came */
-} station;
+    observer_link *trace_links;
+    int signal_fd;
+    sigset_t mask_before;
+    pid_t child; /* 0: none */
+    int status;
+    char directory[PATH_ROOM]; /* for the command of `run`: links and socket; "": none */
+} program;
 
-typedef struct {
-    int epoll, inotify, signals;
-    uint64_t epoch_ns; /* real time of the controller's instant 0 */
-    unsigned speedup;
-} loop;
-
-/* -- Clocks ---------------------------------------------------------------------------------------------------------- */
-
-static uint64_t real_ns(void)
+static int fail(const char *what)
 {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * NS_PER_S + (uint64_t)now.tv_nsec;
+    (void)fprintf(stderr, "dryrig-emu: %s: %s\n", what, strerror(errno));
+    return 1;
 }
 
-/* The controller's clock at a real instant, and the first real instant at which it shows a time. */
-static uint64_t controller_us(const loop *l, uint64_t ns)
-{
-    const uint64_t gone_ns = ns - l->epoch_ns;
-    return gone_ns / NS_PER_US * l->speedup + gone_ns % NS_PER_US * l->speedup / NS_PER_US;
-}
+/* -- Signals --------------------------------------------------------------------------------------------------------- */
 
-static uint64_t real_instant_ns(const loop *l, uint64_t us)
+/* Without a command, a signal ends the program. With one, it is the command's to decide, and its end is ours. The terminal
+ * has sent its own to both of us. */
+static void on_signal(source *who, uint32_t events)
 {
-    const uint64_t n = l->speedup;
-    return l->epoch_ns + us / n * NS_PER_US + (us % n * NS_PER_US + n - 1u) / n;
-}
-
-/* -- One station: an instrument at its port ---------------------------------------------------------------------------- */
-
-static void say(station *s, const char *text)
-{
-    if (s->trace.file != NULL)
-        trace_event(&s->trace, &s->ins, text);
-}
-
-/* Brings the instrument to now_us and hands what leaves to the port. */
-static void advance(station *s, uint64_t now_us)
-{
-    uint8_t bytes[CHUNK];
-    size_t count;
-    while (instrument_run(&s->ins, now_us, bytes, sizeof bytes, &count)) {
-        if (s->ins.controller.notes != NULL)
-            trace_tell(&s->trace, &s->ins);
-        if (count > 0)
-            (void)pty_put(&s->port, bytes, count);
+    (void)events;
+    program *const p = (program *)who;
+    struct signalfd_siginfo signal;
+    while (read(p->signal_fd, &signal, sizeof signal) == (ssize_t)sizeof signal) {
+        const bool is_child = signal.ssi_signo == (uint32_t)SIGCHLD;
+        if (is_child && p->child > 0 && child_has_ended(p->child, &p->status)) {
+            p->child = 0;
+            p->e.is_over = true;
+        } else if (!is_child && p->child > 0 && signal.ssi_code != SI_KERNEL) {
+            (void)kill(p->child, (int)signal.ssi_signo);
+        } else if (!is_child && p->child == 0) {
+            p->e.is_over = true;
+        }
     }
 }
 
-/* Takes what the host has sent, as far as the line has room. */
-static void listen(station *s, uint64_t now_ns, uint64_t now_us)
+/* SIGINT and SIGTERM end the program even where they came in ignored, as in a background job; an ignored SIGHUP is somebody's
+ * wish (nohup). */
+static bool open_signals(program *p)
 {
-    uint8_t bytes[INSTRUMENT_LINE_MAX];
-    for (;;) {
-        const size_t room = instrument_room(&s->ins);
-        s->has_unread = room < ROOM_WORTH_READING;
-        if (s->has_unread)
-            return;
-        const size_t count = pty_read(&s->port, bytes, room);
-        if (count == 0)
-            return;
-        const uint64_t pause_us = (now_ns - s->read_ns) / NS_PER_US;
-        s->read_ns = now_ns;
-        (void)instrument_take(&s->ins, pause_us < UINT32_MAX ? (uint32_t)pause_us : UINT32_MAX, bytes, count);
-        advance(s, now_us);
-        if (count < room) /* the kernel has no more; it will say when it has */
-            return;
+    sigset_t caught;
+    (void)sigemptyset(&caught);
+    (void)sigaddset(&caught, SIGINT);
+    (void)sigaddset(&caught, SIGTERM);
+    struct sigaction hangup;
+    if (sigaction(SIGHUP, NULL, &hangup) != 0 || hangup.sa_handler != SIG_IGN)
+        (void)sigaddset(&caught, SIGHUP);
+    if (p->o->task == TASK_RUN) {
+        (void)sigaddset(&caught, SIGCHLD);
+        (void)sigaddset(&caught, SIGQUIT);
+        (void)sigaddset(&caught, SIGUSR1);
+        (void)sigaddset(&caught, SIGUSR2);
+        (void)signal(SIGCHLD, SIG_DFL); /* where it came in ignored, the command's end would go unseen */
     }
+    (void)sigprocmask(SIG_BLOCK, &caught, &p->mask_before);
+    if (p->o->task != TASK_RUN) {
+        (void)signal(SIGINT, SIG_DFL);
+        (void)signal(SIGTERM, SIG_DFL);
+    }
+    (void)signal(SIGPIPE, SIG_IGN);
+    p->signal_fd = signalfd(-1, &caught, SFD_NONBLOCK | SFD_CLOEXEC);
+    p->signals.ready = on_signal;
+    return p->signal_fd >= 0 && engine_watch(&p->e, &p->signals, p->signal_fd, EPOLLIN);
 }
 
-static void watch_writing(const loop *l, station *s, bool wants_write)
-{
-    if (s->wants_write == wants_write)
-        return;
-    struct epoll_event event = {.events = EPOLLIN | EPOLLET | (wants_write ? EPOLLOUT : 0), .data.ptr = s};
-    (void)epoll_ctl(l->epoll, EPOLL_CTL_MOD, s->port.fd, &event);
-    s->wants_write = wants_write;
-}
+/* -- Telling --------------------------------------------------------------------------------------------------------- */
 
-static void tell_loss(station *s)
+static void introduce_one(const setup *s, unsigned speedup)
 {
-    if (s->told_loss || s->port.lost_bytes == 0)
-        return;
-    s->told_loss = true;
+    char firmware[16];
+    (void)dr_words_firmware(firmware, sizeof firmware, s->firmware);
     (void)fprintf(stderr,
-                  "dryrig-emu: the host does not read %s: what it is sent from now on is lost, as on a real port\n",
-                  s->port.path);
-    say(s, "the host does not read: bytes for it are lost");
+                  "dryrig-emu emulates a Sutter %s, firmware %s. It is not affiliated with Sutter Instrument.\n",
+                  dr_words_controller(s->kind), firmware);
+    (void)fprintf(stderr, "  devices: ");
+    for (uint8_t i = 0; i < s->drive_count; i++)
+        (void)fprintf(stderr, "%s%s", i == 0 ? "" : ", ", dr_words_stage((dr_stage_id)s->drives[i].stage));
+    (void)fprintf(stderr, "\n  quirks:  ");
+    for (unsigned i = 0, said = 0; i < DR_QUIRK_IDS; i++)
+        if ((s->quirk_ids & 1u << i) != 0)
+            (void)fprintf(stderr, "%s%s", said++ == 0 ? "" : ", ", dr_words_quirk((dr_quirk_id)i)->name);
+    (void)fprintf(stderr, "%s\n  line:    ", s->quirk_ids == 0 ? "none, as documented" : "");
+    if (s->is_paced)
+        (void)fprintf(stderr, "%u baud", (unsigned)(s->kind == DR_TRIO ? DR_BAUD_TRIO : DR_BAUD_MPC));
+    else
+        (void)fprintf(stderr, "not paced");
+    if (speedup > 1)
+        (void)fprintf(stderr, ", %u times faster than real time", speedup);
 }
 
-/* Who has opened and closed the port. */
-static void read_hints(const loop *l, station *s)
+static void suggest(const setup *s, const char *port)
 {
-    char hints[1024];
-    ssize_t length;
-    const bool was_open = s->port.opens > 0;
-    while ((length = read(l->inotify, hints, sizeof hints)) > 0) {
-        struct inotify_event hint;
-        for (const char *at = hints; at < hints + length; at += sizeof hint + hint.len) {
-            memcpy(&hint, at, sizeof hint);
-            if (hint.wd == s->port.watch)
-                pty_hint(&s->port, hint.mask);
-        }
+    const char *stage = NULL;
+    for (uint8_t i = 0; i < s->drive_count && stage == NULL; i++)
+        if (s->drives[i].stage != DR_STAGE_NONE)
+            stage = dr_words_stage((dr_stage_id)s->drives[i].stage);
+    if (stage == NULL)
+        (void)fprintf(stderr, "  dryrig --port %s --controller %s info\n", port, dr_words_kind(s->kind));
+    else
+        (void)fprintf(stderr, "  dryrig --port %s --controller %s --stage %s position\n", port, dr_words_kind(s->kind),
+                      stage);
+}
+
+static const char *name_of_port(const station *s) { return s->link != NULL ? s->link : s->port.path; }
+
+/* For people. Stdout carries the one line that programs wait for. */
+static void introduce(const program *p)
+{
+    const engine *const e = &p->e;
+    const rig_member *const members = p->o->rig.members;
+    if (p->o->rig_file == NULL) {
+        introduce_one(&members[0].setup, e->speedup);
+        (void)fprintf(stderr, "\nIt listens at %s until it is interrupted. In another terminal:\n",
+                      name_of_port(&e->stations[0]));
+    } else {
+        (void)fprintf(stderr,
+                      "dryrig-emu emulates %u controllers. It is not affiliated with Sutter Instrument.\n"
+                      "They listen until it is interrupted. In another terminal, for instance:\n",
+                      e->station_count);
     }
-    if (was_open && s->port.was_left)
-        say(s, "nobody has the port open any more");
-    if (s->port.opens > 0 && (!was_open || s->port.was_left))
-        say(s, "the port has been opened");
-    pty_look(&s->port);
+    suggest(&members[0].setup, name_of_port(&e->stations[0]));
 }
 
-/* What was due comes first, then who is there, then what they have sent. */
-static void serve(const loop *l, station *s, uint32_t events, bool has_hints)
+static bool say_ready(const program *p)
 {
-    const uint64_t now_ns = real_ns();
-    const uint64_t now_us = controller_us(l, now_ns);
-    advance(s, now_us);
-    if (has_hints)
-        read_hints(l, s);
-    if ((events & EPOLLIN) != 0 || s->has_unread)
-        listen(s, now_ns, now_us);
-    watch_writing(l, s, !pty_flush(&s->port));
-    tell_loss(s);
-}
-
-/* -- The loop -------------------------------------------------------------------------------------------------------- */
-
-/* Sleeps until something happens. Returns how many events there are. */
-static int wait_for_events(const loop *l, const station *s, struct epoll_event *events, int room)
-{
-    uint64_t due_us;
-    if (!instrument_due(&s->ins, &due_us))
-        return epoll_wait(l->epoll, events, room, -1);
-    const uint64_t due_ns = real_instant_ns(l, due_us);
-    const uint64_t now_ns = real_ns();
-    if (due_ns > now_ns) { /* epoll_wait() counts milliseconds only */
-        struct pollfd any = {.fd = l->epoll, .events = POLLIN};
-        const uint64_t left_ns = due_ns - now_ns;
-        const struct timespec left = {(time_t)(left_ns / NS_PER_S), (long)(left_ns % NS_PER_S)};
-        if (ppoll(&any, 1, &left, NULL) <= 0)
-            return 0;
+    bool done = printf("ready") > 0;
+    for (unsigned i = 0; i < p->e.station_count; i++) {
+        const station *const s = &p->e.stations[i];
+        done = (p->o->rig_file == NULL ? printf(" %s", s->port.path) : printf(" %s=%s", s->name, s->port.path)) > 0 &&
+               done;
     }
-    return epoll_wait(l->epoll, events, room, 0);
+    return printf("\n") > 0 && fflush(stdout) == 0 && done;
 }
 
-static void run(loop *l, station *s)
+/* -- The command of `run` ---------------------------------------------------------------------------------------------- */
+
+/* A directory of its own for links and socket: their paths stay when a plug is pulled and put in again. */
+static bool make_directory(program *p)
 {
-    for (;;) {
-        struct epoll_event events[4];
-        uint32_t port_events = 0;
-        bool has_hints = false;
-        const int count = wait_for_events(l, s, events, 4);
-        for (int i = 0; i < count; i++) {
-            if (events[i].data.ptr == &l->signals)
-                return;
-            if (events[i].data.ptr == &l->inotify)
-                has_hints = true;
-            else
-                port_events |= events[i].events;
-        }
-        serve(l, s, port_events, has_hints);
+    const char *const where = getenv("TMPDIR");
+    const int length = snprintf(p->directory, sizeof p->directory, "%s/dryrig-XXXXXX",
+                                where != NULL && *where == '/' ? where : "/tmp");
+    if (length >= 0 && (size_t)length < sizeof p->directory && mkdtemp(p->directory) != NULL)
+        return true;
+    p->directory[0] = '\0';
+    return false;
+}
+
+static char *in_directory(const program *p, const char *name)
+{
+    char *const path = malloc(PATH_ROOM + RIG_NAME_MAX);
+    if (path != NULL)
+        (void)snprintf(path, PATH_ROOM + RIG_NAME_MAX, "%s/%s", p->directory, name);
+    return path;
+}
+
+static bool prepare_run(program *p)
+{
+    if (!make_directory(p))
+        return false;
+    for (unsigned i = 0; i < p->e.station_count; i++)
+        if (p->e.stations[i].link == NULL && (p->e.stations[i].link = in_directory(p, p->e.stations[i].name)) == NULL)
+            return false;
+    return true;
+}
+
+static void set_environment(const program *p)
+{
+    for (unsigned i = 0; i < p->e.station_count; i++) {
+        const station *const s = &p->e.stations[i];
+        char variable[sizeof "DRYRIG_PORT_" + RIG_NAME_MAX];
+        (void)snprintf(variable, sizeof variable, "DRYRIG_PORT_%s", s->name);
+        (void)setenv(p->o->rig_file == NULL ? "DRYRIG_PORT" : variable, s->link, 1);
     }
 }
 
-/* -- Starting -------------------------------------------------------------------------------------------------------- */
+/* -- From beginning to end ----------------------------------------------------------------------------------------------- */
 
-/* A program that is started without stdin, stdout or stderr must not get the port under their numbers. */
+/* A program that is started without stdin, stdout or stderr must not get a port under their numbers. */
 static void fill_standard_fds(void)
 {
     int fd;
@@ -219,135 +217,98 @@ static void fill_standard_fds(void)
         (void)close(fd);
 }
 
-/* SIGINT and SIGTERM end the program even where they came in ignored, as in a background job; an ignored SIGHUP is somebody's
- * wish (nohup). */
-static int open_signals(void)
+static bool set_up(program *p)
 {
-    sigset_t ending;
-    (void)sigemptyset(&ending);
-    (void)sigaddset(&ending, SIGINT);
-    (void)sigaddset(&ending, SIGTERM);
-    struct sigaction hangup;
-    if (sigaction(SIGHUP, NULL, &hangup) != 0 || hangup.sa_handler != SIG_IGN)
-        (void)sigaddset(&ending, SIGHUP);
-    (void)sigprocmask(SIG_BLOCK, &ending, NULL);
-    (void)signal(SIGINT, SIG_DFL);
-    (void)signal(SIGTERM, SIG_DFL);
-    (void)signal(SIGPIPE, SIG_IGN);
-    return signalfd(-1, &ending, SFD_NONBLOCK | SFD_CLOEXEC);
-}
-
-static void watch(const loop *l, int fd, uint32_t events, void *who)
-{
-    struct epoll_event event = {.events = events, .data.ptr = who};
-    if (epoll_ctl(l->epoll, EPOLL_CTL_ADD, fd, &event) != 0) {
-        (void)fprintf(stderr, "dryrig-emu: cannot wait for events: %s\n", strerror(errno));
-        exit(1);
+    const options *const o = p->o;
+    engine *const e = &p->e;
+    e->mode = o->clock;
+    e->speedup = o->speedup;
+    e->waits_for_client = o->waits_for_client;
+    e->station_count = o->rig.count;
+    e->stations = calloc(o->rig.count, sizeof *e->stations);
+    p->trace_links = calloc(o->rig.count, sizeof *p->trace_links);
+    if (e->stations == NULL || p->trace_links == NULL)
+        return false;
+    for (unsigned i = 0; i < e->station_count; i++) {
+        station *const s = &e->stations[i];
+        s->name = o->rig.members[i].name;
+        s->link = o->rig.members[i].link;
+        setup_apply(&o->rig.members[i].setup, &s->ins, s->drives);
     }
+    return true;
 }
 
-static void set_up(station *s, options *o)
+static bool open_trace(program *p)
 {
-    dr_controller *c = &s->ins.controller;
-    dr_controller_init(c, o->kind, o->drives, o->drive_count);
-    c->firmware = o->firmware;
-    c->quirks = o->quirks;
-    c->angle_deg = o->angle_deg;
-    memcpy(c->home_steps, o->home_steps, sizeof c->home_steps);
-    s->ins.quirks = o->byte_quirks;
-    s->ins.is_paced = o->is_paced;
-}
-
-/* For people. Stdout carries the one line that programs wait for. */
-static void introduce(const options *o, const char *port)
-{
-    char firmware[16];
-    const char *stage = NULL;
-    (void)dr_words_firmware(firmware, sizeof firmware, o->firmware);
-    (void)fprintf(stderr,
-                  "dryrig-emu emulates a Sutter %s, firmware %s. It is not affiliated with Sutter Instrument.\n",
-                  dr_words_controller(o->kind), firmware);
-    (void)fprintf(stderr, "  devices: ");
-    for (uint8_t i = 0; i < o->drive_count; i++) {
-        const char *const name = dr_words_stage((dr_stage_id)o->drives[i].stage);
-        (void)fprintf(stderr, "%s%s", i == 0 ? "" : ", ", name);
-        if (stage == NULL && o->drives[i].stage != DR_STAGE_NONE)
-            stage = name;
+    if (p->o->trace == NULL)
+        return true;
+    if (!trace_open(&p->trace, p->o->trace, p->e.station_count > 1)) {
+        (void)fprintf(stderr, "dryrig-emu: --trace %s: %s\n", p->o->trace, strerror(errno));
+        return false;
     }
-    (void)fprintf(stderr, "\n  quirks:  ");
-    for (unsigned i = 0, said = 0; i < DR_QUIRK_IDS; i++)
-        if ((o->quirk_ids & 1u << i) != 0)
-            (void)fprintf(stderr, "%s%s", said++ == 0 ? "" : ", ", dr_words_quirk((dr_quirk_id)i)->name);
-    (void)fprintf(stderr, "%s\n  line:    ", o->quirk_ids == 0 ? "none, as documented" : "");
-    if (o->is_paced)
-        (void)fprintf(stderr, "%u baud", (unsigned)(o->kind == DR_TRIO ? DR_BAUD_TRIO : DR_BAUD_MPC));
-    else
-        (void)fprintf(stderr, "not paced");
-    if (o->speedup > 1)
-        (void)fprintf(stderr, ", %u times faster than real time", o->speedup);
-    (void)fprintf(stderr, "\nIt listens at %s until it is interrupted. In another terminal:\n", port);
-    if (stage == NULL)
-        (void)fprintf(stderr, "  dryrig --port %s --controller %s info\n", port, dr_words_kind(o->kind));
-    else
-        (void)fprintf(stderr, "  dryrig --port %s --controller %s --stage %s position\n", port, dr_words_kind(o->kind),
-                      stage);
-}
-
-static int fail(const char *what)
-{
-    (void)fprintf(stderr, "dryrig-emu: %s: %s\n", what, strerror(errno));
-    return 1;
-}
-
-/* The port is open, the link is made. */
-static int start_and_run(loop *l, station *s, const options *o)
-{
-    if (o->trace != NULL && !trace_open(&s->trace, o->trace, &s->ins)) {
-        (void)fprintf(stderr, "dryrig-emu: --trace %s: %s\n", o->trace, strerror(errno));
-        return 1;
+    for (unsigned i = 0; i < p->e.station_count; i++) {
+        p->trace_links[i].who = &p->trace.base;
+        station_observe(&p->e.stations[i], &p->trace_links[i]);
     }
-    introduce(o, o->link != NULL ? o->link : s->port.path);
-    l->epoch_ns = s->read_ns = real_ns();
-    instrument_start(&s->ins, 0);
-    if (printf("ready %s\n", s->port.path) < 0 || fflush(stdout) != 0)
-        return fail("cannot write the line 'ready' to stdout");
-    run(l, s);
-    if (s->trace.file != NULL)
-        trace_close(&s->trace);
-    return 0;
+    return true;
+}
+
+/* The ports are open, the links are made. */
+static void start_and_run(program *p)
+{
+    p->status = 1;
+    if (!open_trace(p))
+        return;
+    const bool has_command = p->o->task == TASK_RUN;
+    if (!has_command)
+        introduce(p);
+    engine_start(&p->e);
+    if (!has_command && !say_ready(p)) {
+        (void)fail("cannot write the line 'ready' to stdout");
+        return;
+    }
+    if (has_command) {
+        set_environment(p);
+        p->child = child_start(p->o->command, &p->mask_before, &p->status);
+        if (p->child == 0)
+            return;
+    }
+    p->status = 0;
+    engine_run(&p->e);
+}
+
+static int run(program *p)
+{
+    char why[PATH_ROOM + 256];
+    if (!set_up(p))
+        return fail("no memory");
+    if (!engine_open(&p->e) || !open_signals(p))
+        return fail("cannot wait for events (/proc/sys/fs/inotify and ulimit -n have limits)");
+    if (p->o->task == TASK_RUN && !prepare_run(p))
+        return fail("run: cannot make a directory for the command's ports (TMPDIR says where)");
+    if (engine_plug(&p->e, why, sizeof why)) {
+        start_and_run(p);
+        engine_close(&p->e);
+        trace_close(&p->trace);
+    } else {
+        (void)fprintf(stderr, "dryrig-emu: %s\n", why);
+        p->status = 1;
+    }
+    if (p->directory[0] != '\0')
+        (void)rmdir(p->directory);
+    return p->status;
 }
 
 int main(int argc, char **argv)
 {
-    static station s;
-    loop l = {.epoll = -1};
+    static program p;
     fill_standard_fds();
-    options o = options_read(argc, argv);
-    set_up(&s, &o);
-    l.speedup = o.speedup;
-
-    l.signals = open_signals();
-    l.epoll = epoll_create1(EPOLL_CLOEXEC);
-    l.inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
-    if (l.signals < 0 || l.epoll < 0 || l.inotify < 0)
-        return fail("cannot wait for events (/proc/sys/fs/inotify and ulimit -n have limits)");
-    (void)prctl(PR_SET_TIMERSLACK, 1ul, 0ul, 0ul, 0ul); /* bytes are 78 us apart, the usual slack is 50 us */
-
-    const char *const wrong = pty_open(&s.port, l.inotify);
-    if (wrong != NULL)
-        return fail(wrong);
-    watch(&l, l.signals, EPOLLIN, &l.signals);
-    watch(&l, l.inotify, EPOLLIN, &l.inotify);
-    watch(&l, s.port.fd, EPOLLIN | EPOLLET, &s);
-
-    char why[512];
-    const int lock = o.link == NULL ? -1 : link_make(o.link, s.port.path, why, sizeof why);
-    if (o.link != NULL && lock < 0) {
-        (void)fprintf(stderr, "dryrig-emu: --link: %s\n", why);
-        return 1;
+    static options o;
+    o = options_read(argc, argv);
+    p.o = &o;
+    if (o.task == TASK_CHECK) {
+        (void)printf("%s: %u controller%s, nothing wrong\n", o.rig_file, o.rig.count, o.rig.count == 1 ? "" : "s");
+        return 0;
     }
-    const int status = start_and_run(&l, &s, &o);
-    if (o.link != NULL)
-        link_remove(o.link, s.port.path, lock);
-    return status;
+    return run(&p);
 }

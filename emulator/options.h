@@ -2,24 +2,32 @@
 #ifndef OPTIONS_H
 #define OPTIONS_H
 
-#include "dr_controller.h" /* dr_drive, dr_kind */
+#include "engine.h" /* clock_mode */
+#include "rig.h"    /* the controllers */
 
 #define SPEEDUP_MAX 1000u
+#define OPTIONS_DO_MAX 64u
+
+typedef enum {
+    TASK_EMULATE, /* one controller, or those of a rig file */
+    TASK_RUN,     /* the same, for as long as a command runs */
+    TASK_CHECK    /* is this rig file right? */
+} task;
 
 typedef struct {
-    dr_kind kind;
-    uint16_t firmware; /* binary-coded decimal */
-    dr_drive drives[DR_PORTS];
-    uint8_t drive_count;          /* ports: 1 on a TRIO, DR_PORTS on an MPC-200 */
-    uint32_t home_steps[DR_AXES]; /* TRIO */
-    uint8_t angle_deg;            /* TRIO */
-    uint16_t quirks;              /* DR_QUIRK_* */
-    uint8_t byte_quirks;          /* INSTRUMENT_* */
-    uint16_t quirk_ids;           /* the same, by name: bit 1 << dr_quirk_id */
-    bool is_paced;
-    unsigned speedup;  /* 1 to SPEEDUP_MAX */
-    const char *link;  /* NULL: none */
-    const char *trace; /* NULL: none; "-": stderr */
+    task task;
+    rig rig;
+    const char *rig_file; /* NULL: one controller */
+    char **command;       /* TASK_RUN: its words, NULL at the end */
+    clock_mode clock;
+    unsigned speedup; /* 1 to SPEEDUP_MAX */
+    bool waits_for_client;
+    const char *trace;   /* NULL: none; "-": stderr */
+    const char *control; /* NULL: none */
+    const char *dos[OPTIONS_DO_MAX];
+    unsigned do_count;
+    uint64_t seed;
+    bool seed_is_chosen; /* by the program */
 } options;
 
 /* Ends the program after --help or --version (exit status 0), or when something is wrong (2, and stderr says what is allowed). */

@@ -8,39 +8,43 @@
 #define TEXT 512
 #define HEX_WIDTH ((int)(3u * DR_FRAME_MAX))
 
-bool trace_open(trace *t, const char *path, instrument *ins)
+static void see(observer *o, const observation *seen);
+
+bool trace_open(trace *t, const char *path, bool has_names)
 {
     memset(t, 0, sizeof *t);
+    t->base.see = see;
     const bool to_stderr = strcmp(path, "-") == 0;
-    t->name = to_stderr ? "stderr" : path;
+    t->path = to_stderr ? "stderr" : path;
     t->file = to_stderr ? stderr : fopen(path, "we");
     if (t->file == NULL)
         return false;
     (void)setvbuf(t->file, NULL, _IOLBF, BUFSIZ);
-    dr_notes_init(&t->notes, t->ring, TRACE_NOTES);
-    ins->controller.notes = &t->notes;
+    t->is_on = true;
+    t->has_names = has_names;
     return true;
 }
 
 /* What cannot be written is said once; the emulator goes on without a trace. */
 static void give_up(trace *t)
 {
-    (void)fprintf(stderr, "dryrig-emu: the trace ends here, %s cannot be written: %s\n", t->name, strerror(errno));
+    (void)fprintf(stderr, "dryrig-emu: the trace ends here, %s cannot be written: %s\n", t->path, strerror(errno));
     if (t->file != stderr)
         (void)fclose(t->file);
     t->file = NULL;
 }
 
-static void tell(trace *t, uint64_t when_us, char direction, const char *hex, const char *text)
+static void tell(trace *t, const char *name, uint64_t when_us, char direction, const char *hex, const char *text)
 {
     if (t->file == NULL)
         return;
     const unsigned long long seconds = when_us / DR_US_PER_S;
     const unsigned micros = (unsigned)(when_us % DR_US_PER_S);
-    const int done =
-        hex[0] == '\0' ? fprintf(t->file, "%5llu.%06u %c %s\n", seconds, micros, direction, text)
-                       : fprintf(t->file, "%5llu.%06u %c %-*s %s\n", seconds, micros, direction, HEX_WIDTH, hex, text);
-    if (done < 0)
+    const int width = hex[0] == '\0' ? 0 : HEX_WIDTH;
+    const int named = t->has_names ? fprintf(t->file, "%-8s ", name) : 0;
+    const int done = fprintf(t->file, "%5llu.%06u %c %-*s%s%s\n", seconds, micros, direction, width, hex,
+                             width > 0 ? " " : "", text);
+    if (named < 0 || done < 0)
         give_up(t);
 }
 
@@ -51,12 +55,6 @@ static size_t add_hex(char *hex, size_t at, const uint8_t *bytes, size_t count)
     return at;
 }
 
-/* Notes carry the controller's 32-bit clock and are never from the future. */
-static uint64_t when_of(const instrument *ins, const dr_note *note)
-{
-    return ins->now_us - (dr_us)((dr_us)ins->now_us - note->when);
-}
-
 static dr_words_context context_of(const instrument *ins, const dr_note *note)
 {
     const dr_controller *c = &ins->controller;
@@ -64,22 +62,24 @@ static dr_words_context context_of(const instrument *ins, const dr_note *note)
     return (dr_words_context){(dr_kind)c->kind, c->firmware, stage};
 }
 
-static void tell_streamed(trace *t, const instrument *ins)
+static void tell_streamed(trace *t)
 {
     if (t->streamed_count == 0)
         return;
-    const dr_words_context context = context_of(ins, &t->streamed);
+    const dr_words_context context = context_of(t->streaming, &t->streamed);
     char hex[3 * DR_FRAME_MAX + 1] = "", last[TEXT], text[2 * TEXT];
     (void)add_hex(hex, 0, t->streamed.bytes, t->streamed.count);
     (void)dr_words_note(last, sizeof last, &context, &t->streamed);
     (void)snprintf(text, sizeof text, "%u streamed position%s, the last: %s", (unsigned)t->streamed_count,
                    t->streamed_count == 1 ? "" : "s", last);
-    tell(t, when_of(ins, &t->streamed), '<', hex, text);
     t->streamed_count = 0;
+    tell(t, t->streaming_name, t->streamed_us, '<', hex, text);
 }
 
-static void tell_note(trace *t, const instrument *ins, const dr_note *note)
+static void tell_note(trace *t, const observation *seen)
 {
+    const dr_note *const note = seen->note;
+    const instrument *const ins = seen->ins;
     const dr_words_context context = context_of(ins, note);
     const bool is_interrupt = note->op == DR_OP_MPC_INTERRUPT || note->op == DR_OP_TRIO_INTERRUPT;
     char hex[3 * (DR_FRAME_MAX + 1) + 1] = "", text[TEXT];
@@ -102,40 +102,52 @@ static void tell_note(trace *t, const instrument *ins, const dr_note *note)
     const size_t length = dr_words_note(text, sizeof text, &context, note);
     if (length < sizeof text)
         (void)snprintf(text + length, sizeof text - length, "%s", changed);
-    tell(t, when_of(ins, note), direction, hex, text);
+    tell(t, seen->name, seen->when_us, direction, hex, text);
 }
 
-void trace_tell(trace *t, const instrument *ins)
+static void see(observer *o, const observation *seen)
 {
-    dr_note note;
-    while (dr_notes_take(&t->notes, &note)) {
-        if (note.what == DR_NOTE_STREAM) {
-            t->streamed = note;
-            t->streamed_count++;
-            continue;
-        }
-        tell_streamed(t, ins);
-        tell_note(t, ins, &note);
+    trace *const t = (trace *)o;
+    if (t->file == NULL || !t->is_on)
+        return;
+    const bool is_note = seen->what == OBSERVED_NOTE;
+    if (is_note && seen->note->what == DR_NOTE_STREAM) {
+        if (t->streaming != seen->ins)
+            tell_streamed(t);
+        t->streaming = seen->ins;
+        t->streaming_name = seen->name;
+        t->streamed_us = seen->when_us;
+        t->streamed = *seen->note;
+        t->streamed_count++;
+        return;
     }
-    if (t->missed != t->notes.missed) {
-        char text[64];
-        (void)snprintf(text, sizeof text, "%u events are missing here", (unsigned)(t->notes.missed - t->missed));
-        trace_event(t, ins, text);
-        t->missed = t->notes.missed;
+    switch (seen->what) {
+    case OBSERVED_NOTE:
+        tell_streamed(t);
+        tell_note(t, seen);
+        break;
+    case OBSERVED_OPENED:
+    case OBSERVED_CLOSED:
+    case OBSERVED_FAULT:
+    case OBSERVED_EVENT:
+        tell_streamed(t);
+        tell(t, seen->name, seen->when_us, '-', "", seen->text);
+        break;
+    case OBSERVED_FROM_HOST: /* the notes tell what they mean */
+    case OBSERVED_TO_HOST:
+    case OBSERVED_LOST:
+    case OBSERVED_TTY:
+    case OBSERVED_END:
+        break;
     }
-}
-
-void trace_event(trace *t, const instrument *ins, const char *text)
-{
-    tell_streamed(t, ins);
-    tell(t, ins->now_us, '-', "", text);
 }
 
 void trace_close(trace *t)
 {
     if (t->file == NULL)
         return;
+    tell_streamed(t);
     if (fflush(t->file) != 0 || (t->file != stderr && fclose(t->file) != 0))
-        (void)fprintf(stderr, "dryrig-emu: %s is incomplete: %s\n", t->name, strerror(errno));
+        (void)fprintf(stderr, "dryrig-emu: %s is incomplete: %s\n", t->path, strerror(errno));
     t->file = NULL;
 }

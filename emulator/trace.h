@@ -9,28 +9,25 @@
 #ifndef TRACE_H
 #define TRACE_H
 
-#include "instrument.h" /* whose notes it tells */
+#include "observe.h" /* whose observations it tells */
 
 #include <stdio.h>
 
-#define TRACE_NOTES 64u
-
 typedef struct {
+    observer base;
     FILE *file;
-    const char *name; /* for messages */
-    dr_notes notes;
-    dr_note ring[TRACE_NOTES];
+    const char *path; /* for messages */
+    bool is_on;       /* as opened, and `trace on`, `trace off` */
+    bool has_names;   /* a line begins with the station's name */
     dr_note streamed; /* the last of the group of streamed positions that is under way */
+    uint64_t streamed_us;
+    const instrument *streaming; /* whose they are */
+    const char *streaming_name;
     uint32_t streamed_count;
-    uint32_t missed; /* notes that did not fit the ring, told so far */
 } trace;
 
-/* Opens a file, or stderr where path is "-", and makes the instrument write notes. False: errno says why. */
-bool trace_open(trace *t, const char *path, instrument *ins);
+/* Opens a file, or stderr where path is "-". False: errno says why. */
+bool trace_open(trace *t, const char *path, bool has_names);
 void trace_close(trace *t);
-/* Tells what the instrument has noted, or, when the file is no more, forgets it. Call it whenever instrument_run() has returned true. */
-void trace_tell(trace *t, const instrument *ins);
-/* Tells an event that is not the controller's. */
-void trace_event(trace *t, const instrument *ins, const char *text);
 
 #endif

@@ -1,0 +1,102 @@
+"""Rig files: several controllers in one process, each with its own port; and what is said about wrong files."""
+import os
+import subprocess
+import sys
+import unittest
+
+import emu
+from emu import Port, point
+
+CR = b"\r"
+RIGHT = """
+controllers = (
+    { name = "left"; controller = "mpc"; link = "LINK"; devices = [ "none", "MP-285" ];
+      positions = [ "1000um,0um,0um" ]; quirks = "position-13"; },
+    { name = "right"; controller = "trio"; angle = "45"; home = "1,2,3"; },
+    { controller = "mpc"; firmware = "3.19"; }
+);
+"""
+
+
+class Rig(unittest.TestCase):
+    def setUp(self):
+        context = emu.directory()
+        self.directory = context.__enter__()
+        self.addCleanup(context.__exit__, None, None, None)
+        self.path = os.path.join(self.directory, "rig.cfg")
+        self.link = os.path.join(self.directory, "link")
+
+    def write(self, text):
+        with open(self.path, "w", encoding="ascii") as file:
+            file.write(text.replace("LINK", self.link))
+
+    def test_each_controller_is_what_the_file_says(self):
+        self.write(RIGHT)
+        process = emu.start("rig", self.path)
+        ready = process.stdout.readline().decode().split()
+        self.assertEqual(ready[0], "ready")
+        paths = dict(word.split("=") for word in ready[1:])
+        self.assertEqual(list(paths), ["left", "right", "mpc"])
+        self.assertEqual(os.readlink(self.link), paths["left"])
+        with Port(paths["left"]) as left, Port(paths["right"]) as right, Port(paths["mpc"]) as other:
+            self.assertEqual(left.ask(b"C", 13), point(16000, 0, 0) + CR)
+            self.assertEqual(left.ask(b"U", 6), b"\x01\x00\x01\x00\x00" + CR)
+            self.assertEqual(right.ask(b"c", 14)[12], 45)
+            right.send(b"h")
+            self.assertEqual(other.ask(b"K", 4), b"\x01\x19\x03" + CR)
+            self.assertEqual(right.receive(1), CR)
+            self.assertEqual(right.ask(b"c", 14)[:12], point(1, 2, 3))
+        process.terminate()
+        process.communicate(timeout=emu.LIMIT_S)
+        self.assertEqual(process.returncode, 0)
+        self.assertFalse(os.path.lexists(self.link))
+
+    def test_run_gives_each_port_a_variable(self):
+        self.write(RIGHT)
+        script = "import os; print(sorted(k for k in os.environ if k.startswith('DRYRIG_PORT'))); print(os.environ['DRYRIG_PORT_left'])"
+        done = subprocess.run([emu.PROGRAM, "run", "--rig", self.path, "--", sys.executable, "-c", script],
+                              capture_output=True, check=False, timeout=emu.LIMIT_S)
+        self.assertEqual(done.returncode, 0, done)
+        names, left = done.stdout.decode().splitlines()
+        self.assertEqual(names, "['DRYRIG_PORT_left', 'DRYRIG_PORT_mpc', 'DRYRIG_PORT_right']")
+        self.assertEqual(left, self.link)
+
+    def test_check(self):
+        self.write(RIGHT)
+        self.assertEqual(emu.outcome("rig", "check", self.path), (0, f"{self.path}: 3 controllers, nothing wrong\n", ""))
+
+    def refused(self, text, line, column, *words):
+        self.write(text)
+        status, out, error = emu.outcome("rig", "check", self.path)
+        self.assertEqual((status, out), (2, ""), error)
+        self.assertIn(f"{self.path}:{line}:{column}: ", error)
+        for word in words:
+            self.assertIn(word, error)
+
+    def test_errors_have_line_and_column(self):
+        self.refused("controllers = (\n  { controller = \"mpc\"; devices = [ \"MP-225\",\n      \"MP-999\" ]; }\n);", 3, 7 + 1, "MP-999", "MP-845")
+        self.refused("controllers = (\n  { controler = \"mpc\"; }\n);", 2, 5, "controler", "controller")
+        self.refused("controllers = (\n  { controller = \"mpc\" \n    name = [1; }\n);", 3, 5, "")
+        self.refused("controllers = ( { name = \"a\"; } );", 1, 1, "controller =")
+        self.refused("controllers = (\n  { controller = \"mpc\"; },\n  { controller = \"mpc\"; }\n);", 3, 19, "already")
+        self.refused("controllers = (\n  { controller = \"trio\"; angle = \"91\"; }\n);", 2, 35, "91", "90")
+        self.refused("controllers = (\n  { controller = \"trio\"; angle = 91; }\n);", 2, 26, "quotation")
+        self.refused("controllers = (\n  { controller = \"mpc\"; name = \"a b\"; }\n);", 2, 33, "a b", "letters")
+        self.refused("", 1, 1, "controllers = (")
+        self.refused("speed = 1;\n", 1, 1, "speed")
+        self.refused("controllers = ( );", 1, 1, "list")
+
+    def test_a_file_that_is_not_there(self):
+        status, _, error = emu.outcome("rig", "check", self.path)
+        self.assertEqual(status, 2)
+        self.assertIn(self.path, error)
+
+    def test_options_of_one_controller_have_no_meaning(self):
+        self.write(RIGHT)
+        status, _, error = emu.outcome("rig", self.path, "--device", "MP-285")
+        self.assertEqual(status, 2)
+        self.assertIn("rig file", error)
+
+
+if __name__ == "__main__":
+    emu.main()
