@@ -46,8 +46,10 @@ typedef struct {
     const uint8_t *bytes;  /* FROM_HOST, TO_HOST, LOST */
     size_t count;
     uint32_t pause_us;         /* FROM_HOST: since the host's bytes before, in real time; UINT32_MAX: longer */
+    uint32_t unread;           /* FROM_HOST, CLOSED, END: bytes for the host that it had not read when it did this */
     const dr_note *note;       /* NOTE */
     const struct termios *tty; /* TTY */
+    uint32_t baud;             /* TTY: the rate that the host has set; no standard one has a name in a termios */
     const char *text;          /* FAULT, EVENT: one line */
 } observation;
 
