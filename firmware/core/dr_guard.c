@@ -46,8 +46,7 @@ typedef enum {
 #define SMALL_MOVE_US MS(100) /* 15 microsteps at the slowest speed take 15 ms */
 #define SMALL_MOVE_STEPS 16u  /* an MPC-200 ignores shorter moves, without a CR ([P], small-move-silent) */
 #define CALIBRATION_US MS(60000)
-#define MOVE_LONGEST_US MS(2000000) /* instants are told apart up to 35 minutes */
-#define STALE_US MS(20000)          /* the longest travel, by knob */
+#define STALE_US MS(20000) /* the longest travel, by knob */
 #define JUMP_Q (20 * (int32_t)DR_QUANTA_PER_UM)
 #define READY_US MS(1000) /* "ready about one second after power-on" [O] */
 #define PROVE_RETRY_US MS(1000)
@@ -60,7 +59,7 @@ typedef enum {
 #define RELEASE_US MS(20)
 #define RAW_STOPS_MAX 15u /* ^C that wait to leave */
 #define CTRL_C 0x03u
-#define EVENTS_MAX 256u /* that can be due at once, when nobody called for long */
+#define EVENTS_MAX 32u /* at most so many in one call; a caller who comes that late is due again at once */
 
 /* -- Small helpers ------------------------------------------------------------------------------------------------- */
 
@@ -289,6 +288,10 @@ static dr_command position_query(const dr_guard *g)
 static void send_query(dr_guard *g, dr_us now)
 {
     const dr_command query = position_query(g);
+    if (is_leaving(g)) { /* a frame that nobody pulls on */
+        set_timer(g, DR_TIMER_READ, now + FRAME_GAP_US);
+        return;
+    }
     put_out(g, &query.code, 1, 1);
     g->read_phase = READ_SENT;
     g->read_have = 0;
@@ -351,7 +354,8 @@ static void keep_old_target(dr_guard *g)
 static void break_off_unproved(dr_guard *g)
 {
     keep_old_target(g);
-    g->scene.frame_lost = g->scene.frame_lost || is_calibration(g->command.op);
+    if (is_calibration(g->command.op))
+        g->scene.frame_lost = true;
 }
 
 /* Sends ^C, drops whatever is pending, and proves rest. */
@@ -497,8 +501,7 @@ static bool has_jumped(const dr_guard *g, dr_us now, const dr_reply *reply)
 {
     const uint8_t drive = kind_of(g) == DR_TRIO ? 0 : (uint8_t)(reply->value - 1u);
     dr_stage stage;
-    if (!g->position_known || drive != g->scene.drive ||
-        !dr_stage_get((dr_stage_id)g->limits->drives[drive].stage, &stage))
+    if (drive != g->scene.drive || !dr_stage_get((dr_stage_id)g->limits->drives[drive].stage, &stage))
         return false;
     const bool locked = has_rig(g, DR_RIG_KNOBS_LOCKED);
     if (!locked && !is_running(g, DR_TIMER_STALE))
@@ -575,7 +578,8 @@ static dr_us longest_us(const dr_guard *g)
     }
     const uint64_t speed = dr_judge_speed(g->limits, g->path_drive, line ? g->request.value : DR_SPEED_FULL, false);
     const uint64_t lasts_us = way_q * 3u * (DR_US_PER_S / 2u) / speed + MS(2000);
-    return lasts_us < MOVE_LONGEST_US ? (dr_us)lasts_us : MOVE_LONGEST_US;
+    return (dr_us)
+        lasts_us; /* the longest: 87.5 mm in all (MP-865) at 81 um/s, 27 minutes; instants are told apart up to 35 */
 }
 
 static bool is_small(const dr_guard *g)
@@ -798,8 +802,7 @@ static void push_reading(dr_guard *g, dr_us now, uint8_t byte)
 
 static void flush_quarantined(dr_guard *g, dr_us now)
 {
-    if (g->quarantined_count > 0)
-        log_bytes(g, now, DR_EVENT_QUARANTINED, 0, DR_OP_NONE, g->quarantined, g->quarantined_count);
+    log_bytes(g, now, DR_EVENT_QUARANTINED, 0, DR_OP_NONE, g->quarantined, g->quarantined_count);
     g->quarantined_count = 0;
 }
 
@@ -983,9 +986,9 @@ static void stop_by_host(dr_guard *g, dr_us now)
 
 static dr_reason may_pass(const dr_guard *g, const dr_command *command)
 {
-    if (g->tainted || g->task != TASK_NONE)
+    if (g->tainted) /* its last byte too, if not all */
         return DR_REASON_BUSY;
-    if (!g->device_present || (!g->proved && !g->ambiguous))
+    if (!g->proved && !g->ambiguous)
         return DR_REASON_NOT_ARMED;
     if ((command->is & DR_IS_QUERY) != 0)
         return DR_REASON_NONE;
@@ -1100,6 +1103,10 @@ static void task_due(dr_guard *g, dr_us now)
         start_reading(g, now, 0);
         break;
     case TASK_PASS:
+        if (is_leaving(g)) { /* nobody pulls on it */
+            set_timer(g, DR_TIMER_TASK, now + REPLY_TIMEOUT_US);
+            break;
+        }
         log_event(g, now, DR_EVENT_NO_REPLY, g->command.op, DR_NO_ITEM);
         withdraw(g);
         end_task(g);
@@ -1343,7 +1350,7 @@ static void stop_contacts(dr_guard *g, dr_us now)
     if (first == second) {
         clear_timer(g, DR_TIMER_WIRING);
         g->wiring_alarm = false;
-    } else if (!is_running(g, DR_TIMER_WIRING)) {
+    } else {
         set_timer(g, DR_TIMER_WIRING, now + WIRING_US);
     }
     if (!first && !second)
@@ -1356,7 +1363,7 @@ static void stop_contacts(dr_guard *g, dr_us now)
 
 static void arm_pressed(dr_guard *g, dr_us now)
 {
-    if (g->mode == MODE_DISARMED && needs_of(g) == 0 && !is_leaving(g)) {
+    if (g->mode == MODE_DISARMED && needs_of(g) == 0) {
         g->task = TASK_ARM;
         start_reading(g, now, FRAME_GAP_US);
     }
@@ -1393,9 +1400,10 @@ static void input_changed(dr_guard *g, dr_us now, dr_input what, bool on)
             arm_pressed(g, now);
         break;
     case DR_INPUT_TIP_CHANGED:
-        g->tip_changed = g->tip_changed || on;
-        if (on)
+        if (on) {
+            g->tip_changed = true;
             disarm(g, now, DR_STOP_KEY);
+        }
         break;
     case DR_INPUT_LOG_FAILED:
         if (on)

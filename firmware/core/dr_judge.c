@@ -278,6 +278,8 @@ static dr_verdict judge_point(const dr_limits *l, uint8_t drive, const int32_t a
 dr_verdict dr_judge_place(const dr_limits *l, uint8_t drive, const uint32_t steps[DR_AXES])
 {
     int32_t at_q[DR_AXES];
+    if (l->drives[drive].stage == DR_STAGE_NONE)
+        return refuse(DR_REASON_DRIVE, DR_AXES, drive + 1, 0);
     to_quanta(steps, stage_of(l, drive).quanta_per_step, at_q);
     return judge_point(l, drive, at_q, l->margin_q);
 }

@@ -97,7 +97,7 @@ dr_path dr_judge_path(const dr_limits *limits, const dr_scene *scene, const dr_c
                       const dr_request *request);
 /* By how much ways of this command are grown: margin, and what a knob may do before the motion begins. */
 int32_t dr_judge_margin_q(const dr_limits *limits, const dr_command *command);
-/* Is the tip in the box and clear of obstacles? Else why not (DR_REASON_LIMIT or DR_REASON_KEEP_OUT). */
+/* Is the tip in the box and clear of obstacles? Else why not (DR_REASON_LIMIT, _KEEP_OUT, or _DRIVE). */
 dr_verdict dr_judge_place(const dr_limits *limits, uint8_t drive, const uint32_t steps[DR_AXES]);
 /* The speed to reckon with: the faster (fastest) or slower (!fastest) of the documented and the measured; quanta/s. */
 uint32_t dr_judge_speed(const dr_limits *limits, uint8_t drive, uint8_t level, bool fastest);

@@ -170,6 +170,13 @@ static bool has_problem(dr_limits_problem *problem, dr_limits_error error, uint8
     return false;
 }
 
+static bool check(bool is_good, dr_limits_problem *problem, dr_limits_error error, uint8_t item)
+{
+    if (!is_good)
+        (void)has_problem(problem, error, item, DR_AXES);
+    return is_good;
+}
+
 bool dr_limits_get(const uint8_t *image, size_t size, dr_limits *out, dr_limits_problem *problem)
 {
     uint32_t crc = 0;
@@ -320,7 +327,7 @@ static bool check_box(const dr_drive_limits *d, const dr_stage *stage, uint8_t i
 static bool check_surface(const dr_drive_limits *d, const dr_stage *stage, uint8_t item, dr_limits_problem *problem)
 {
     if (d->retract == DR_TO_NONE)
-        return is_zero(d->approach) || has_problem(problem, DR_LIMITS_APPROACH, item, DR_AXES);
+        return check(is_zero(d->approach), problem, DR_LIMITS_APPROACH, item);
     if (d->retract > DR_TO_MORE_Z)
         return has_problem(problem, DR_LIMITS_SURFACE, item, DR_AXES);
     const uint8_t axis = dr_to_axis(d->retract);
@@ -369,7 +376,7 @@ static bool check_shape(const dr_obstacle *o, uint8_t item, dr_limits_problem *p
         if (!is_direction(o->half_q.normal) || is_zero(o->half_q.normal) ||
             !is_within(o->half_q.offset_q, -OFFSET_FAR, OFFSET_FAR))
             return has_problem(problem, DR_LIMITS_OBSTACLE_NORMAL, item, DR_AXES);
-        return o->exit == DR_TO_NONE || has_problem(problem, DR_LIMITS_OBSTACLE_EXIT, item, DR_AXES);
+        return check(o->exit == DR_TO_NONE, problem, DR_LIMITS_OBSTACLE_EXIT, item);
     }
     if (o->shape != DR_SHAPE_BOX)
         return has_problem(problem, DR_LIMITS_SHAPE, item, DR_AXES);
@@ -377,7 +384,7 @@ static bool check_shape(const dr_obstacle *o, uint8_t item, dr_limits_problem *p
         if (o->box_q.min_q[axis] > o->box_q.max_q[axis] || o->box_q.min_q[axis] < -DR_FAR_Q ||
             o->box_q.max_q[axis] > DR_FAR_Q)
             return has_problem(problem, DR_LIMITS_OBSTACLE_BOX, item, axis);
-    return o->exit <= DR_TO_MORE_Z || has_problem(problem, DR_LIMITS_OBSTACLE_EXIT, item, DR_AXES);
+    return check(o->exit <= DR_TO_MORE_Z, problem, DR_LIMITS_OBSTACLE_EXIT, item);
 }
 
 /* Grown by the margin, as the judge will. Needs a good shape and a good drive. */
@@ -404,7 +411,7 @@ static bool check_obstacle(const dr_limits *l, uint8_t item, dr_limits_problem *
     if (o->shape == DR_SHAPE_BOX ? !dr_box_touches_box(&near, &o->box_q) : !dr_box_touches_half(&near, &o->half_q))
         return has_problem(problem, DR_LIMITS_OBSTACLE_OUTSIDE, item, DR_AXES);
     const dr_obstacle bigger = grown(o, l->margin_q);
-    return !covers(&bigger, &l->drives[o->drive].box_q) || has_problem(problem, DR_LIMITS_NO_ROOM, o->drive, DR_AXES);
+    return check(!covers(&bigger, &l->drives[o->drive].box_q), problem, DR_LIMITS_NO_ROOM, o->drive);
 }
 
 bool dr_limits_check(const dr_limits *l, dr_limits_problem *problem)

@@ -49,8 +49,12 @@ static void monitor_record(const dr_record *record)
     }
     if (record->event == DR_EVENT_ALLOWED || record->event == DR_EVENT_STOP)
         rig.refused_open = false;
-    TEST_ASSERT_EQUAL_HEX32_MESSAGE(dr_record_crc(rig.crc, record), record->crc, "the log's chain is broken");
+    if (record->sequence == rig.next_sequence) /* else: some were overwritten unread, and counted */
+        TEST_ASSERT_EQUAL_HEX32_MESSAGE(dr_record_crc(rig.crc, record), record->crc, "the log's chain is broken");
+    else
+        TEST_ASSERT_TRUE(status().log_missed > 0);
     rig.crc = record->crc;
+    rig.next_sequence = record->sequence + 1;
 }
 
 static void monitor_state(void)

@@ -49,7 +49,7 @@ struct bench {
 
     dr_record log[512]; /* the newest records */
     uint32_t log_count;
-    uint32_t crc;
+    uint32_t crc, next_sequence;
     uint32_t frames_refused; /* M4: records of it */
 
     uint8_t sent[WIRE_MAX]; /* by the host, M1 */

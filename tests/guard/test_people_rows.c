@@ -546,7 +546,7 @@ static void row_74_after_a_reset_in_mid_move_ctrl_c_goes_first(void)
     host_line(0, 84000, 80000, 80000);
     run_ms(200);
     dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64); /* a watchdog's reset */
-    rig.crc = 0;
+    rig.crc = rig.next_sequence = 0;
     rig.frames_refused = 0;
     rig.state = DR_GUARD_LOCKED;
     dr_guard_start(&rig.guard, guard_clock(), true);
