@@ -32,7 +32,8 @@ static struct {
     unsigned purges, closes, writes;
     bool purged, babbles;
     bool has_second;
-    uint32_t second_us; /* after the answer to ^C comes another CR, so much later; 0: none */
+    uint64_t stopped_us, after_stop_us; /* from ^C to the next command */
+    uint32_t second_us;                 /* after the answer to ^C comes another CR, so much later; 0: none */
 } script;
 
 static int script_read(void *context, void *bytes, size_t room, uint32_t timeout_us)
@@ -68,6 +69,10 @@ static int script_write(void *context, const void *bytes, size_t count)
     const uint64_t pause_us = script.now_us - script.quiet_us;
     TEST_ASSERT_LESS_OR_EQUAL_size_t(l->sent_count - script.sent_at, count);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(l->sent + script.sent_at, bytes, count);
+    if (script.stopped_us != 0 && script.after_stop_us == 0)
+        script.after_stop_us = script.now_us - script.stopped_us;
+    if (l->sent[0] == 0x03)
+        script.stopped_us = script.now_us;
     if (l->sent[0] == 0x03)
         TEST_ASSERT_FALSE_MESSAGE(script.purged, "^C must not throw away what the move has said");
     else if (script.sent_at == 0) {
@@ -466,6 +471,7 @@ static void two_crs_after_an_interrupt(void)
     dryrig_watch(d, press_stop, NULL);
     FAILS(DRYRIG_ERR_INTERRUPTED, dryrig_move_steps(d, target, DRYRIG_ORDER_AUTO, NULL));
     TEST_ASSERT_EQUAL_size_t(8, script.at); /* no more: it was never in doubt */
+    TEST_ASSERT_GREATER_THAN_UINT64(16000, script.after_stop_us);
 }
 
 static void wrong_answers_are_refused_and_asked_again(void)
@@ -477,7 +483,9 @@ static void wrong_answers_are_refused_and_asked_again(void)
         LINE("C", "\x01\0\0\0\x01\0\0\0\0\0\0\0\0\x0D", 1300), /* 16 million steps */
         IN_STEP(M_AT_0),
         LINE("C", M_AT_0, 1300),
-        LINE("C", M_AT_1, 1300), /* not the same twice */
+        LINE("C", M_AT_1, 1300),        /* not the same twice */
+        LINE("C", M_AT_1 "\x0D", 1300), /* the last one is looked behind as well */
+        IN_STEP(M_AT_1),
         LINE("C", M_AT_1, 1300),
     };
     dryrig_position p;
