@@ -155,6 +155,18 @@ static void read_hints(engine *e)
     }
 }
 
+/* Takes what a host has sent, as far as the line has room. */
+static void listen_to(engine *e, station *s)
+{
+    while (station_read(s)) {
+        const bool has_more = s->chunk_is_full; /* if not, the kernel will say when it has */
+        read_hints(e);                          /* see station_take() */
+        station_take(s, e->now_us, e->now_ns);
+        if (!has_more)
+            return;
+    }
+}
+
 static void hints_ready(source *who, uint32_t events)
 {
     (void)who; /* read ahead of everything else, see engine_run() */
@@ -281,10 +293,10 @@ void engine_run(engine *e)
                 read_hints(e);
         for (int i = 0; i < count; i++)
             if (is_station(e, events[i].data.ptr) && (events[i].events & EPOLLIN) != 0)
-                station_listen(station_of(e, events[i].data.ptr), e->now_us, e->now_ns);
+                listen_to(e, station_of(e, events[i].data.ptr));
         for (unsigned i = 0; i < e->station_count; i++)
             if (e->stations[i].has_unread)
-                station_listen(&e->stations[i], e->now_us, e->now_ns);
+                listen_to(e, &e->stations[i]);
         for (int i = 0; i < count && !e->is_over; i++)
             if (events[i].data.ptr != NULL && !is_station(e, events[i].data.ptr))
                 ((source *)events[i].data.ptr)->ready(events[i].data.ptr, events[i].events);
@@ -302,7 +314,10 @@ void engine_catch_up(engine *e)
     run_to_now(e);
     read_hints(e);
     for (unsigned i = 0; i < e->station_count; i++)
-        station_listen(&e->stations[i], e->now_us, e->now_ns);
+        while (station_read(&e->stations[i])) { /* until a read finds nothing: it has waited for what was on its way */
+            read_hints(e);
+            station_take(&e->stations[i], e->now_us, e->now_ns);
+        }
 }
 
 void engine_advance(engine *e, uint64_t until_us, bool until_idle)
@@ -315,7 +330,7 @@ void engine_advance(engine *e, uint64_t until_us, bool until_idle)
         run_to_now(e);
         for (unsigned i = 0; i < e->station_count; i++) /* the line has room again for what it left in the port */
             if (e->stations[i].has_unread)
-                station_listen(&e->stations[i], e->now_us, e->now_ns);
+                listen_to(e, &e->stations[i]);
         flush_all(e);
     }
     if (!until_idle && until_us > e->now_us)

@@ -1,11 +1,13 @@
 #include "station.h"
 
 #include "link.h" /* the stable name */
+#include "tty.h"  /* the rate that the host has set */
 
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/inotify.h>
+#include <sys/ioctl.h>
 
 #define NS_PER_US UINT64_C(1000)
 #define CHUNK 64u /* bytes that leave at one instant, at most: a reply and what was kept behind it */
@@ -16,6 +18,14 @@
 static observation seen_now(const station *s, observed_kind what)
 {
     return (observation){.what = what, .name = s->name, .ins = &s->ins, .when_us = s->ins.now_us, .real_ns = s->now_ns};
+}
+
+/* What is there for the host to read. */
+static uint32_t count_unread(const station *s)
+{
+    int in_kernel = 0;
+    (void)ioctl(s->port.host_fd, FIONREAD, &in_kernel);
+    return (uint32_t)in_kernel + (uint32_t)s->port.waiting_count;
 }
 
 void station_say(station *s, observed_kind what, const char *text)
@@ -50,17 +60,6 @@ void station_unobserve(station *s, observer_link *link)
         s->ins.controller.notes = NULL; /* without anybody to tell, none are made */
 }
 
-static void tell_bytes(const station *s, observed_kind what, const uint8_t *bytes, size_t count, uint32_t pause_us)
-{
-    if (s->observers == NULL)
-        return;
-    observation seen = seen_now(s, what);
-    seen.bytes = bytes;
-    seen.count = count;
-    seen.pause_us = pause_us;
-    observe(s->observers, &seen);
-}
-
 static void tell_notes(station *s)
 {
     dr_note note;
@@ -90,6 +89,7 @@ bool station_plug(station *s, int inotify_fd, char *why, size_t room)
         return false;
     }
     s->tty = s->port.raw;
+    s->baud = tty_baud(s->port.host_fd);
     if (s->link != NULL && (s->link_lock = link_make(s->link, s->port.path, why, room)) < 0) {
         (void)inotify_rm_watch(inotify_fd, s->port.watch);
         pty_close(&s->port);
@@ -123,7 +123,12 @@ void station_start(station *s, uint64_t now_us, uint64_t now_ns)
 static void send_to_host(station *s, const uint8_t *bytes, size_t count)
 {
     const bool done = s->is_plugged && pty_put(&s->port, bytes, count);
-    tell_bytes(s, done ? OBSERVED_TO_HOST : OBSERVED_LOST, bytes, count, 0);
+    if (s->observers != NULL) {
+        observation seen = seen_now(s, done ? OBSERVED_TO_HOST : OBSERVED_LOST);
+        seen.bytes = bytes;
+        seen.count = count;
+        observe(s->observers, &seen);
+    }
     if (s->is_plugged && !s->told_loss && s->port.lost_bytes > 0) {
         s->told_loss = true;
         (void)fprintf(stderr,
@@ -156,48 +161,66 @@ static bool is_same_tty(const struct termios *a, const struct termios *b)
 static void tell_tty(station *s)
 {
     struct termios tty;
-    if (s->observers == NULL || tcgetattr(s->port.host_fd, &tty) != 0 || is_same_tty(&tty, &s->tty))
+    const uint32_t baud = tty_baud(s->port.host_fd);
+    if (tcgetattr(s->port.host_fd, &tty) != 0 || (is_same_tty(&tty, &s->tty) && baud == s->baud))
         return;
     s->tty = tty;
+    s->baud = baud;
     observation seen = seen_now(s, OBSERVED_TTY);
     seen.tty = &s->tty;
+    seen.baud = baud;
     observe(s->observers, &seen);
 }
 
-void station_listen(station *s, uint64_t now_us, uint64_t now_ns)
+bool station_read(station *s)
 {
-    uint8_t bytes[INSTRUMENT_LINE_MAX];
-    while (s->is_plugged) {
-        const size_t room = instrument_room(&s->ins);
-        s->has_unread = room < ROOM_WORTH_READING;
-        if (s->has_unread)
-            return;
-        const size_t count = pty_read(&s->port, bytes, room);
-        if (count == 0)
-            return;
-        tell_tty(s);
-        const uint64_t pause_us = (now_ns - s->read_ns) / NS_PER_US;
-        const uint32_t pause = pause_us < UINT32_MAX ? (uint32_t)pause_us : UINT32_MAX;
-        s->read_ns = now_ns;
-        tell_bytes(s, OBSERVED_FROM_HOST, bytes, count, pause);
-        (void)instrument_take(&s->ins, pause, bytes, count);
-        station_run(s, now_us, now_ns);
-        if (count < room) /* the kernel has no more; it will say when it has */
-            return;
-    }
+    const size_t room = instrument_room(&s->ins);
+    s->has_unread = room < ROOM_WORTH_READING;
+    if (s->has_unread || !s->is_plugged)
+        return false;
+    s->chunk_count = pty_read(&s->port, s->chunk, room);
+    s->chunk_is_full = s->chunk_count == room;
+    if (s->chunk_count > 0 && s->observers != NULL)
+        s->unread = count_unread(s);
+    return s->chunk_count > 0;
 }
 
+void station_take(station *s, uint64_t now_us, uint64_t now_ns)
+{
+    const uint64_t pause_us = (now_ns - s->read_ns) / NS_PER_US;
+    const uint32_t pause = pause_us < UINT32_MAX ? (uint32_t)pause_us : UINT32_MAX;
+    s->read_ns = s->now_ns = now_ns;
+    if (s->observers != NULL) {
+        tell_tty(s);
+        observation seen = seen_now(s, OBSERVED_FROM_HOST);
+        seen.bytes = s->chunk;
+        seen.count = s->chunk_count;
+        seen.pause_us = pause;
+        seen.unread = s->unread;
+        observe(s->observers, &seen);
+    }
+    (void)instrument_take(&s->ins, pause, s->chunk, s->chunk_count);
+    station_run(s, now_us, now_ns);
+}
+
+/* First what is to be done, then telling: who is told acts on it. */
 void station_look(station *s)
 {
     if (!s->is_plugged)
         return;
-    if (s->was_open && s->port.was_left)
-        station_say(s, OBSERVED_CLOSED, "nobody has the port open any more");
-    if (s->port.opens > 0 && (!s->was_open || s->port.was_left)) {
+    const bool was_left = s->port.was_left;
+    observation left = seen_now(s, OBSERVED_CLOSED);
+    if (was_left)
+        left.unread = count_unread(s);
+    pty_look(&s->port);
+    left.text = "nobody has the port open any more";
+    if (s->was_open && was_left)
+        observe(s->observers, &left);
+    if (s->port.opens > 0 && (!s->was_open || was_left)) {
         s->tty = s->port.raw;
+        s->baud = tty_baud(s->port.host_fd);
         station_say(s, OBSERVED_OPENED, "the port has been opened");
     }
-    pty_look(&s->port);
 }
 
 bool station_flush(station *s) { return !s->is_plugged || pty_flush(&s->port); }

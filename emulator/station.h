@@ -33,6 +33,11 @@ struct station {
     uint64_t now_ns;    /* real time, as the last call said */
     uint32_t missed;    /* notes that did not fit the ring, told so far */
     struct termios tty; /* how the host had set the port when its last bytes came */
+    uint32_t baud;
+    uint32_t unread;                    /* by the host, when its last bytes came */
+    uint8_t chunk[INSTRUMENT_LINE_MAX]; /* between station_read() and station_take() */
+    size_t chunk_count;
+    bool chunk_is_full; /* there may be more */
     dr_notes notes;
     dr_note ring[STATION_NOTES];
 };
@@ -46,8 +51,11 @@ void station_start(station *s, uint64_t now_us, uint64_t now_ns);
 
 /* Brings the instrument to now_us and hands what leaves to the port. */
 void station_run(station *s, uint64_t now_us, uint64_t now_ns);
-/* Takes what the host has sent, as far as the line has room. The station has been run to now_us. */
-void station_listen(station *s, uint64_t now_us, uint64_t now_ns);
+/* Reads what the host has sent, as far as the line has room. False: nothing now. */
+bool station_read(station *s);
+/* Takes it, at now_us. Between the two comes station_look(): who has opened or closed the port has done so before the bytes
+ * that are there now, and what is on its way to a host that has gone must not meet the answer to the next. */
+void station_take(station *s, uint64_t now_us, uint64_t now_ns);
 /* Somebody may have opened or closed the port: pty_hint() has been called, was_open says how it was before. */
 void station_look(station *s);
 /* Gives the kernel what the host is to read. True: all of it. */

@@ -177,6 +177,7 @@ class HostThatDoesNotRead(unittest.TestCase):
         with Emulator("mpc", "--pace", "off") as e, Port(e.path) as port:
             for _ in range(100):
                 port.send(b"C" * 100)
+            e.wait_for(b"does not read")
             answer = b"\x01" + point(0, 0, 0) + b"\r"
             got = port.receive(10000 * 14, 1.0)
             self.assertGreater(len(got), 17000)
