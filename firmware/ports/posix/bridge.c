@@ -20,6 +20,7 @@
 #define S_US UINT64_C(1000000)
 #define TRY_AGAIN_US (S_US / 2)     /* while the controller's port is gone */
 #define CHECK_US S_US               /* memory, while something may move */
+#define REST_US (3 * S_US)          /* at the end; then it is left as it is */
 #define STEP_US (UINT64_C(1) << 30) /* the guard tells instants apart up to 2^31 us */
 #define CHUNK 256u
 #define CTRL_C 0x03u
@@ -267,6 +268,7 @@ static int open_signals(void)
     (void)signal(SIGINT, SIG_DFL);
     (void)signal(SIGTERM, SIG_DFL);
     (void)signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGXFSZ, SIG_IGN); /* a log that may not grow is an error to be told */
     return signalfd(-1, &ending, SFD_NONBLOCK | SFD_CLOEXEC);
 }
 
@@ -280,6 +282,27 @@ static void introduce(const bridge *b)
                   "  limits:  %s, revision %u, hash %08X\n  host:    open %s instead of %s\n",
                   dr_words_controller((dr_kind)l->kind), firmware, b->options->port, b->options->config, l->revision,
                   dr_limits_crc(l), b->options->link != NULL ? b->options->link : b->host.path, b->options->port);
+}
+
+/* As when the key is turned off: a frame that has been begun is finished, so that the controller does not wait for the rest of
+ * it; what moves is stopped, and proved to be at rest. Orders are not taken any more. */
+static void come_to_rest(bridge *b)
+{
+    struct pollfd fds[FDS];
+    dr_guard_status status;
+    advance(b);
+    const uint64_t until_us = b->now_us + REST_US;
+    (void)close(b->signals);
+    b->signals = -1;
+    dr_guard_input(&b->guard, bridge_now(b), DR_INPUT_KEY, false);
+    bridge_pump(b);
+    for (dr_guard_get_status(&b->guard, &status); (status.needs & DR_NEEDS_REST) != 0 && b->now_us < until_us;
+         dr_guard_get_status(&b->guard, &status)) {
+        wait(b, fds);
+        for (unsigned i = FD_CONTROL; i < FDS; i++)
+            fds[i].revents = 0;
+        serve(b, fds);
+    }
 }
 
 /* Everything is open. The guard wakes up, and so does the controller if the last guard died over it: it gets a ^C first. */
@@ -299,10 +322,7 @@ static int start_and_run(bridge *b, bool after_crash)
             break;
         serve(b, fds);
     }
-    /* As when the key is turned off: what moves is stopped. */
-    advance(b);
-    dr_guard_input(&b->guard, bridge_now(b), DR_INPUT_KEY, false);
-    bridge_pump(b);
+    come_to_rest(b);
     return 0;
 }
 

@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #define OUT_MAX (1024u * 1024u)
-#define WAITING 4
+#define WAITING 16
 
 static void drop(control_client *who)
 {

@@ -43,48 +43,71 @@ __attribute__((format(printf, 3, 4))) static void fail_at(reader *r, unsigned li
     va_end(arguments);
 }
 
-static unsigned line_of(const config_setting_t *at) { return config_setting_source_line(at); }
+static unsigned line_of(const config_setting_t *at)
+{
+    return config_setting_is_root(at) ? 1u : config_setting_source_line(at);
+}
 
 /* -- What libconfig lets pass ------------------------------------------------------------------------------------------ */
 
-/* libconfig folds numbers that do not fit into others without a word, and reads further files: neither is for a guard. */
+/* libconfig folds numbers that do not fit into others without a word, reads further files, and loses memory over a text
+ * without its end: none of that is for a guard. */
+
+static bool in_word(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '_' || c == '-'; }
+
+static void check_number(reader *r, const char *number, size_t digits, unsigned line, bool is_fraction)
+{
+    if (digits > DIGITS_MAX && !is_fraction)
+        fail_at(r, line, "the number %.20s has more than %u digits before its point", number, DIGITS_MAX);
+    else if (number[digits] == 'x' || number[digits] == 'X' || number[digits] == 'L')
+        fail_at(r, line, "numbers are decimal, without a letter: %.12s", number);
+}
+
+/* What begins here and is no number, as far as it has to be looked at together: how long it is. */
+static size_t length_of_piece(reader *r, const char *at, unsigned line)
+{
+    size_t length = 1;
+    if (*at == '@') {
+        fail_at(r, line, "no other file can be included: a configuration is one file");
+    } else if (*at == '"') {
+        while (at[length] != '\0' && at[length] != '"')
+            length += at[length] == '\\' && at[length + 1] != '\0' ? 2 : 1;
+        if (at[length] == '\0')
+            fail_at(r, line, "the text that begins here has no quotation mark at its end");
+        else
+            length++;
+    } else if (*at == '#' || (at[0] == '/' && at[1] == '/')) {
+        length = strcspn(at, "\n");
+    } else if (at[0] == '/' && at[1] == '*') {
+        const char *const end = strstr(at + 2, "*/");
+        if (end == NULL)
+            fail_at(r, line, "the comment that begins here has no end");
+        else
+            length = (size_t)(end - at) + 2;
+    }
+    return length;
+}
+
 static void check_text(reader *r, const char *text)
 {
     unsigned line = 1;
-    for (const char *at = text; *at != '\0' && !r->failed; at++) {
+    char before = '\0';
+    for (const char *at = text; *at != '\0' && !r->failed;) {
         const size_t digits = strspn(at, "0123456789");
-        if (*at == '\n') {
-            line++;
-        } else if (*at == '"') {
-            for (at++; *at != '\0' && *at != '"'; at++) {
-                line += *at == '\n';
-                at += *at == '\\' && at[1] != '\0';
-            }
-        } else if (*at == '#' || (at[0] == '/' && at[1] == '/')) {
-            at += strcspn(at, "\n") - 1;
-        } else if (at[0] == '/' && at[1] == '*') {
-            for (at += 2; *at != '\0' && !(at[0] == '*' && at[1] == '/'); at++)
-                line += *at == '\n';
-        } else if (*at == '@') {
-            fail_at(r, line, "no other file can be included: a configuration is one file");
-        } else if (digits > 0) {
-            const bool in_name =
-                at > text && strchr("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-", at[-1]) != NULL;
-            if (!in_name && digits > DIGITS_MAX && at[-(at > text)] != '.')
-                fail_at(r, line, "the number %.20s has more than %u digits before its point", at, DIGITS_MAX);
-            else if (!in_name && (at[digits] == 'x' || at[digits] == 'X' || at[digits] == 'L'))
-                fail_at(r, line, "numbers are decimal, without a letter: %.12s", at);
-            at += digits - 1;
-        }
-        if (*at == '\0')
-            return;
+        const size_t length = digits > 0 ? digits : length_of_piece(r, at, line);
+        if (digits > 0 && !in_word(before))
+            check_number(r, at, digits, line, before == '.');
+        for (size_t i = 0; i < length && at[i] != '\0'; i++)
+            line += at[i] == '\n';
+        before = at[length - 1];
+        at += length;
     }
 }
 
 static char *read_file(reader *r)
 {
     FILE *file = fopen(r->path, "re");
-    char *text = malloc(FILE_MAX + 1u);
+    char *text = malloc(FILE_MAX + 2u);
     if (file == NULL || text == NULL) {
         fail_at(r, 0, "%s", strerror(errno));
     } else {
@@ -96,7 +119,7 @@ static char *read_file(reader *r)
         else if (memchr(text, '\0', size) != NULL)
             fail_at(r, 0, "holds a byte of value 0: not a text");
         else
-            text[size] = '\0';
+            (void)memcpy(text + size, "\n", 2); /* libconfig wants an end of the last line */
     }
     if (file != NULL)
         (void)fclose(file);

@@ -12,7 +12,7 @@
 #define RIG_NAME_MAX 32u   /* of an obstacle, the closing 0 included */
 #define RIG_WHY_MAX 512u   /* room for every explanation */
 #define RIG_CONE_SLICES 8u /* boxes that stand for a cone; a cylinder takes one */
-#define RIG_GRID 40u       /* points an axis on which room is counted */
+#define RIG_GRID 24u       /* points an axis on which room is counted */
 
 typedef struct {
     dr_limits limits;                           /* good: dr_limits_check() has passed them */

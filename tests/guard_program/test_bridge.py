@@ -1,0 +1,320 @@
+"""dryrig-guard between a host and an emulator: what passes, what does not, what stops."""
+import os
+import resource
+import subprocess
+import threading
+import unittest
+
+import emu
+import guard
+from guard import Channel, Guard, guarded, line, move_mpc, position_mpc, rig
+
+FAST = ("--pace", "off")
+
+
+class Passing(unittest.TestCase):
+    def both(self, kind, config, dialogue, *args):
+        """The same answers through the guard as without it."""
+        with emu.Emulator(kind, *FAST, *args) as alone, emu.Port(alone.path) as port:
+            expected = [port.ask(question, count) for question, count in dialogue]
+        with guarded(kind, config, *FAST, *args) as (_, g, port):
+            self.assertEqual([port.ask(question, count) for question, count in dialogue], expected)
+            self.assertEqual(g.status()["refused"], 0)
+            self.assertEqual(port.waiting(), 0)
+
+    def test_an_mpc_answers_through_the_guard_as_without_it(self):
+        self.both("mpc", rig(guard.MPC), [
+            (b"C", 14), (b"K", 4), (b"U", 6), (b"I\x01", 2), (b"F", 1), (b"L\x03", 1),
+            (move_mpc(100, 200, 50), 1), (b"C", 14), (move_mpc(0, 0, 0), 1), (b"C", 14), (b"\x03", 1)])
+
+    def test_a_trio_answers_through_the_guard_as_without_it(self):
+        point = emu.point
+        self.both("trio", rig(guard.TRIO), [
+            (b"C", 14), (b"c", 14), (b"A\x2d", 1), (b"C", 14), (b"x" + point(11000, 0, 0)[:4], 1), (b"C", 14),
+            (b"H" + point(10600, 10700, 10800), 1), (b"W" + point(10900, 10800, 10700), 1),
+            (b"S\x0f" + point(12000, 12000, 12000), 1), (b"C", 14), (b"\x03", 1)])
+
+    def test_a_straight_line_of_an_mpc_gets_its_pause_from_the_guard(self):
+        with guarded("mpc", rig(guard.MPC), "--quirks", "s-needs-pause") as (_, g, port):
+            self.assertEqual(port.ask(line(15, 30, 40, 50), 1), b"\r") # in one write: without the guard it would hang
+            self.assertEqual(position_mpc(port.ask(b"C", 14)), (30, 40, 50))
+            self.assertEqual(g.status()["state"], "armed")
+
+    def test_every_byte_value_in_a_position(self):
+        with guarded("mpc", rig(guard.MPC), *FAST) as (_, _, port):
+            for low in range(0, 256, 5):
+                steps = (0x0300 | low, 0x0D00 | low, low << 8 | 0x03)
+                self.assertEqual(port.ask(b"M" + emu.point(*steps), 1), b"\r")
+                self.assertEqual(port.ask(b"C", 14), b"\x01" + emu.point(*steps) + b"\r")
+
+
+class Refusing(unittest.TestCase):
+    def test_a_way_through_an_obstacle_gets_no_answer_and_a_reason(self):
+        with guarded("mpc", rig(guard.MPC, keepouts=guard.POST), *FAST) as (_, g, port):
+            with Channel(g.socket) as follower:
+                self.assertEqual(follower.order("follow")["last_refusal"], None)
+                port.send(line(15, 4000, 4000, 0))
+                while True:
+                    told = follower.answer()
+                    if told["refused"] == 1:
+                        break
+            self.assertEqual(told["last_refusal"]["command"], "line")
+            self.assertEqual(told["last_refusal"]["reason"], "keep-out")
+            self.assertIn("post", told["last_refusal"]["says"])
+            emu.wait_until(lambda: g.status()["state"] == "armed", "armed again")
+            self.assertEqual(port.ask(b"C", 14), b"\x01" + emu.point(0, 0, 0) + b"\r") # no CR came before
+            self.assertEqual(port.ask(line(15, 0, 300, 0), 1), b"\r") # beside it
+            self.assertIn("refused 'line': the way touches an obstacle: post", g.err())
+
+    def test_out_of_the_box(self):
+        with guarded("mpc", rig(guard.MPC, high=1000), *FAST) as (_, g, port):
+            port.send(move_mpc(1001, 0, 0))
+            emu.wait_until(lambda: g.status()["refused"] == 1, "the refusal")
+            self.assertEqual(g.status()["last_refusal"]["reason"], "limit")
+            self.assertEqual(port.ask(move_mpc(1000, 0, 0), 1), b"\r")
+
+    def test_E_where_the_configuration_says_so(self):
+        with guarded("mpc", rig(guard.MPC, high=1000, more='refusal = "E";'), *FAST) as (_, _, port):
+            self.assertEqual(port.ask(move_mpc(1001, 0, 0), 1), b"E")
+
+    def test_nothing_moves_before_it_is_armed(self):
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST) as e, Guard(directory, e.path, rig(guard.MPC)) as g:
+            with emu.Port(g.path) as port:
+                port.send(move_mpc(100, 0, 0))
+                emu.wait_until(lambda: g.status()["refused"] == 1, "the refusal")
+                self.assertEqual(g.status()["last_refusal"]["reason"], "not-armed")
+                self.assertEqual(port.ask(b"C", 14), b"\x01" + emu.point(0, 0, 0) + b"\r")
+
+    def test_a_hostile_host_holds_nobody_up(self):
+        # stderr is a pipe that nobody reads: it must not matter.
+        reader, writer = os.pipe()
+        with guarded("mpc", rig(guard.MPC, high=1000), *FAST, stderr=writer) as (_, g, port):
+            os.close(writer)
+            with Channel(g.socket) as deaf:
+                deaf.order("follow")
+                for i in range(2000):
+                    port.send(bytes((7 * i + j) % 251 + 4 for j in range(64)))
+                answer = g.order("stop")
+                self.assertEqual((answer["ok"], answer["forwarded"]), (True, 0))
+                self.assertGreater(answer["dropped_bytes"] + answer["refused"], 0)
+        os.close(reader)
+
+
+class Stopping(unittest.TestCase):
+    def moving(self, g, port):
+        port.send(line(0, 2000, 0, 0)) # 81 um/s
+        g.wait_for("moving")
+
+    def at_rest(self, port):
+        first = position_mpc(port.ask(b"C", 14))
+        guard.pause(0.1)
+        self.assertEqual(position_mpc(port.ask(b"C", 14)), first)
+        self.assertLess(first[0], 1900)
+        return first
+
+    def test_the_hosts_interrupt(self):
+        with guarded("mpc", rig(guard.MPC)) as (_, g, port):
+            self.moving(g, port)
+            self.assertEqual(port.ask(b"\x03", 1), b"\r")
+            g.wait_for("armed")
+            self.at_rest(port)
+            self.assertEqual(port.waiting(), 0)
+
+    def test_the_second_channels_stop_is_latched_and_clearing_does_not_arm(self):
+        with guarded("mpc", rig(guard.MPC)) as (e, g, port):
+            self.moving(g, port)
+            self.assertEqual(g.order("stop")["ok"], True)
+            g.wait_for("stopped")
+            self.assertEqual(port.receive(1, 0.2), b"") # no CR for a move that was not done
+            self.at_rest(port)
+            port.send(line(0, 0, 0, 0))
+            emu.wait_until(lambda: g.status()["refused"] == 1, "the refusal")
+            answer = g.order("arm")
+            self.assertEqual((answer["ok"], answer["state"]), (False, "stopped"))
+            answer = g.order("clear")
+            self.assertEqual((answer["ok"], answer["state"], answer["next"]), (True, "disarmed", "confirm"))
+            g.arm()
+            self.assertEqual(port.ask(line(15, 10, 0, 0), 1), b"\r")
+            self.assertIsNone(e.process.poll())
+
+    def test_disarming_stops(self):
+        with guarded("mpc", rig(guard.MPC)) as (_, g, port):
+            self.moving(g, port)
+            g.order("disarm")
+            g.wait_for("disarmed")
+            self.at_rest(port)
+
+    def test_a_host_that_goes_away(self):
+        with guarded("mpc", rig(guard.MPC)) as (_, g, port):
+            self.moving(g, port)
+            port.close()
+            g.wait_for("disarmed")
+            with emu.Port(g.path) as again:
+                self.at_rest(again)
+
+    def test_a_guard_that_is_ended_stops_what_moves(self):
+        with emu.directory() as directory, emu.Emulator("mpc") as e:
+            with Guard(directory, e.path, rig(guard.MPC)) as g, emu.Port(g.path) as port:
+                g.arm()
+                self.moving(g, port)
+            with emu.Port(e.path) as port:
+                self.at_rest(port)
+
+
+class Orders(unittest.TestCase):
+    def test_escape(self):
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST, "--position", "1100um,0um,0um") as e:
+            with Guard(directory, e.path, rig(guard.MPC, high=1000)) as g, emu.Port(g.path) as port:
+                answer = g.order("arm")
+                self.assertEqual((answer["ok"], [need["need"] for need in answer["needs"]]), (False, ["inside"]))
+                self.assertEqual(g.order("escape on")["escape"], True)
+                g.arm()
+                port.send(line(15, 1150, 0, 0)) # farther out
+                emu.wait_until(lambda: g.status()["refused"] == 1, "the refusal")
+                self.assertEqual(g.status()["last_refusal"]["reason"], "escape")
+                self.assertEqual(port.ask(line(15, 990, 0, 0), 1), b"\r")
+                g.order("disarm")
+                self.assertEqual(g.status()["escape"], False) # once armed, once allowed
+                g.arm()
+
+    def test_a_surface_wants_a_persons_word(self):
+        surface = 'surface = { retract = "-z"; at_um = 8000; clearance_um = 500; approach = (0, 0, 1); };'
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST) as e:
+            with Guard(directory, e.path, rig(guard.MPC, drive=surface)) as g, emu.Port(g.path) as port:
+                answer = g.order("arm")
+                self.assertEqual((answer["ok"], answer["next"]), (False, "confirm"))
+                self.assertIn("surface", [need["need"] for need in answer["needs"]])
+                self.assertEqual(g.order("surface on")["in_tissue"], True)
+                g.arm()
+                port.send(line(3, 100, 0, 0))
+                emu.wait_until(lambda: g.status()["refused"] == 1, "the refusal")
+                self.assertEqual(g.status()["last_refusal"]["reason"], "approach")
+                self.assertEqual(g.order("surface off")["in_tissue"], False)
+                self.assertEqual(port.ask(line(3, 100, 0, 0), 1), b"\r")
+
+    def test_a_changed_tip_wants_confirmation(self):
+        with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, _):
+            self.assertEqual(g.order("tip-changed")["state"], "disarmed")
+            answer = g.order("arm")
+            self.assertEqual((answer["ok"], [need["need"] for need in answer["needs"]]), (False, ["tip"]))
+            self.assertEqual(g.order("confirm")["confirm_wanted"], False)
+            g.arm()
+
+    def test_calibrating_takes_leave(self):
+        with guarded("mpc", rig(guard.MPC, more="allow_calibrate = true;"), *FAST) as (_, g, port):
+            port.send(b"N")
+            emu.wait_until(lambda: g.status()["refused"] == 1, "the refusal")
+            self.assertEqual(g.status()["last_refusal"]["reason"], "calibrate")
+            self.assertEqual(g.order("allow-calibrate")["may_calibrate"], True)
+            self.assertEqual(port.ask(b"N", 1), b"\r")
+
+    def test_nonsense_is_told(self):
+        with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, _):
+            for order in ("", "arms", "arm now", "surface", "surface maybe", "log x", "log 12x", "\x03"):
+                answer = g.order(order)
+                self.assertEqual((order, answer["ok"]), (order, False))
+                self.assertIn("no such order", answer["why"])
+            with Channel(g.socket) as channel:
+                channel.socket.sendall(b"x" * 4000)
+                self.assertEqual(channel.answer()["why"], "the line is too long")
+            with Channel(g.socket) as channel: # in pieces, and two at once
+                channel.socket.sendall(b"sta")
+                channel.socket.sendall(b"tus\nstatus\n")
+                self.assertEqual([channel.answer()["ok"], channel.answer()["ok"]], [True, True])
+
+    def test_more_clients_than_places(self):
+        with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, _):
+            channels = [Channel(g.socket) for _ in range(8)]
+            for channel in channels:
+                self.assertEqual(channel.order("status")["ok"], True)
+            with Channel(g.socket) as ninth:
+                self.assertEqual(ninth.answer()["why"], "too many are connected")
+            channels.pop().close()
+            emu.wait_until(lambda: self.answers(g), "a free place")
+            for channel in channels:
+                channel.close()
+
+    @staticmethod
+    def answers(g):
+        try:
+            return g.status()["ok"]
+        except (AssertionError, OSError):
+            return False
+
+    def test_the_program_gives_orders_too(self):
+        with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, _):
+            status, out, _ = guard.run("ctl", g.socket, "status")
+            self.assertEqual(status, 0)
+            self.assertIn("state:    armed", out)
+            self.assertEqual(guard.run("ctl", g.socket, "disarm")[0], 0)
+            self.assertEqual(guard.run("ctl", g.socket, "stop")[0], 0)
+            status, out, err = guard.run("ctl", g.socket, "arm")
+            self.assertEqual(status, 4)
+            self.assertIn("not armed", err)
+            self.assertIn(f"next:     dryrig-guard ctl {g.socket} clear", out)
+            self.assertEqual(guard.run("ctl", g.socket, "clear")[0], 0)
+            self.assertEqual(guard.run("ctl", g.socket, "surface", "off")[0], 0)
+            status, out, _ = guard.run("ctl", "--json", g.socket, "log", "3")
+            self.assertEqual((status, out.count('"event"')), (0, 3))
+        status, _, err = guard.run("ctl", g.socket, "status")
+        self.assertEqual(status, 1)
+        self.assertIn("Does a guard run with --control there?", err)
+
+
+class Log(unittest.TestCase):
+    def test_it_is_whole_and_tampering_shows(self):
+        with guarded("mpc", rig(guard.MPC, high=1000), *FAST) as (_, g, port):
+            port.ask(move_mpc(10, 20, 30), 1)
+            port.send(move_mpc(1001, 0, 0))
+            emu.wait_until(lambda: g.status()["refused"] == 1, "the refusal")
+            g.stop()
+            status, out, _ = guard.run("log", g.log)
+            self.assertEqual(status, 0, out)
+            self.assertIn("of 1 starts", out)
+            with open(g.log, encoding="utf-8") as file:
+                lines = file.readlines()
+            self.assertTrue(any(" allowed " in one and "move" in one for one in lines))
+            self.assertTrue(any(" refused " in one and "limit on axis X" in one for one in lines))
+            for spoiled, where in ((lines[:5] + lines[6:], 6), (lines[:3] + [lines[3].replace("#0", "#1", 1)] + lines[4:], 4),
+                                   (lines[:4] + [lines[2]] + lines[4:], 5), (lines[:-1] + [lines[-1][:-9] + "\n"], len(lines))):
+                with open(g.log, "w", encoding="utf-8") as file:
+                    file.writelines(spoiled)
+                status, _, err = guard.run("log", g.log)
+                self.assertEqual(status, 4)
+                self.assertIn(f"{g.log}:{where}: ", err)
+
+    def test_a_log_that_cannot_be_written_disarms(self):
+        def small_files():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST) as e:
+            g = Guard(directory, e.path, rig(guard.MPC), preexec_fn=small_files)
+            with g, emu.Port(g.path) as port:
+                g.order("arm")
+                for _ in range(40):
+                    port.ask(b"C", 14)
+                g.wait_for("disarmed")
+                answer = g.order("arm")
+                self.assertEqual((answer["ok"], [need["need"] for need in answer["needs"]]), (False, ["log"]))
+                self.assertIn("cannot be written", g.err())
+
+
+class Rest(unittest.TestCase):
+    def test_idle_costs_nothing(self):
+        with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, port):
+            port.ask(b"C", 14)
+            g.order("disarm")
+            before = g.switches()
+            guard.pause(1.0)
+            # Others open and close terminals meanwhile, and each is an event of the directory that is watched.
+            self.assertLess(g.switches() - before, 200)
+
+    def test_a_host_that_does_not_read_holds_nobody_up(self):
+        with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, port):
+            writer = threading.Thread(target=lambda: [port.send(b"C") or guard.pause(0.002) for _ in range(3000)])
+            writer.start()
+            writer.join(emu.LIMIT_S)
+            self.assertEqual(g.order("stop")["ok"], True)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,288 @@
+"""Starting and ending dryrig-guard: exit statuses, what is left behind, kill -9 of everybody in every order."""
+import os
+import signal
+import stat
+import subprocess
+import unittest
+
+import emu
+import guard
+from guard import Guard, line, position_mpc, rig
+
+
+def config_file(directory, text=None):
+    path = os.path.join(directory, "rig.conf")
+    with open(path, "w", encoding="ascii") as file:
+        file.write(rig(guard.MPC) if text is None else text)
+    return path
+
+
+class Failing(unittest.TestCase):
+    def fails(self, directory, status, words, *args):
+        before = sorted(os.listdir(directory))
+        code, out, err = guard.run(*args)
+        self.assertEqual((code, out), (status, ""), err)
+        for word in words:
+            self.assertIn(word, err)
+        self.assertEqual(sorted(os.listdir(directory)), before)
+
+    def test_wrong_options(self):
+        with emu.directory() as directory:
+            conf = config_file(directory)
+            self.fails(directory, 2, ["--port is missing"], "--config", conf)
+            self.fails(directory, 2, ["--config is missing"], "--port", "/dev/null")
+            self.fails(directory, 2, ["--port is given twice"], "--port", "a", "--port", "b", "--config", conf)
+            self.fails(directory, 2, ["'go' is no option"], "go", "--port", "a", "--config", conf)
+            self.fails(directory, 2, ["expected a socket and an order"], "ctl", "x")
+            self.fails(directory, 2, ["which file?"], "check")
+            self.fails(directory, 2, ["expected a configuration and a command"], "explain", conf)
+            self.fails(directory, 2, ["--drive 5"], "explain", conf, "--drive", "5", "home")
+
+    def test_a_wrong_configuration(self):
+        with emu.directory() as directory:
+            conf = config_file(directory, rig(guard.MPC).replace("margin_um", "margin"))
+            self.fails(directory, 3, [f"{conf}:3: 'margin' has no unit"], "--port", "/dev/null", "--config", conf)
+            self.fails(directory, 3, [f"{conf}:3: 'margin' has no unit"], "check", conf)
+            self.fails(directory, 3, ["No such file"], "check", conf + "x")
+
+    def test_a_port_that_is_none_or_somebody_elses(self):
+        with emu.directory() as directory, emu.Emulator("mpc") as e:
+            conf = config_file(directory)
+            rest = ("--config", conf, "--link", directory + "/host", "--control", directory + "/ctl", "--log", directory + "/log")
+            self.fails(directory, 1, ["--port", "is not a serial port"], "--port", conf, *rest)
+            with emu.directory() as other, Guard(other, e.path, rig(guard.MPC)):
+                self.fails(directory, 1, [e.path, "is in use by dryrig-guard"], "--port", e.path, *rest)
+
+    def test_a_path_that_is_taken(self):
+        with emu.directory() as directory, emu.Emulator("mpc") as e, emu.Emulator("mpc") as second:
+            with Guard(directory, e.path, rig(guard.MPC)) as g:
+                free = directory + "/free"
+                base = ("--port", second.path, "--config", g.config)
+                self.fails(directory, 1, ["--control", "another guard has it"], *base, "--link", free, "--control", g.socket,
+                           "--log", directory + "/log2")
+                self.fails(directory, 1, ["--link", "in use"], *base, "--link", g.link, "--control", free)
+                self.fails(directory, 1, ["is no socket; it stays"], *base, "--link", free, "--control", g.config)
+                self.fails(directory, 1, ["it stays"], *base, "--link", g.config, "--control", free)
+                self.fails(directory, 1, ["No such file"], *base, "--link", free, "--control", directory + "/none/ctl")
+                self.fails(directory, 1, ["No such file"], *base, "--link", free, "--log", directory + "/none/log")
+                self.fails(directory, 1, [": is no file"], *base, "--link", free, "--log", "/dev/null")
+                self.fails(directory, 1, ["1 to 107 characters"], *base, "--control", directory + "/" + "x" * 200)
+                self.assertEqual(g.status()["state"], "disarmed")
+
+    def test_a_stdout_that_is_full(self):
+        with emu.directory() as directory, emu.Emulator("mpc") as e, open("/dev/full", "wb") as full:
+            conf = config_file(directory)
+            done = subprocess.run([guard.PROGRAM, "--port", e.path, "--config", conf, "--link", directory + "/host", "--control",
+                                   directory + "/ctl"], stdout=full, stderr=subprocess.PIPE, timeout=emu.LIMIT_S, check=False)
+            self.assertEqual(done.returncode, 1)
+            self.assertEqual(os.listdir(directory), ["rig.conf"])
+
+
+class Ending(unittest.TestCase):
+    def test_nothing_is_left_behind(self):
+        for how in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            with emu.directory() as directory, emu.Emulator("mpc") as e:
+                with Guard(directory, e.path, rig(guard.MPC)) as g:
+                    self.assertEqual(stat.S_IMODE(os.stat(g.socket).st_mode), 0o600)
+                    self.assertEqual(os.readlink(g.link), g.path)
+                    self.assertEqual(g.stop(how), 0)
+                self.assertEqual(sorted(os.listdir(directory)), ["log", "rig.conf", "stderr"])
+
+
+    def test_a_frame_that_has_been_begun_is_finished(self):
+        with emu.directory() as directory, emu.Emulator("mpc") as e:
+            with Guard(directory, e.path, rig(guard.MPC)) as g, emu.Port(g.path) as port:
+                g.arm()
+                port.send(line(0, 2000, 0, 0))
+                g.wait_for("moving") # its first bytes are on the wire
+                self.assertEqual(g.stop(), 0)
+            with emu.Port(e.path) as port: # at rest, and it listens
+                self.assertLess(position_mpc(port.ask(b"C", 14))[0], 100)
+
+
+class Telling(unittest.TestCase):
+    def test_check(self):
+        with emu.directory() as directory:
+            status, out, err = guard.run("check", config_file(directory, rig(guard.TRIO, keepouts=guard.POST, margin=50)))
+            self.assertEqual((status, err), (0, ""))
+            for words in ("TRIO MP-245A, firmware 3.12", "hash          ", "room          ", '"post", drive 1: X 2,000.0 to 3,000.0 um',
+                          "S  line         checked, while armed\n", "h  home         refused: ", "R  recalibrate  refused: "):
+                self.assertIn(words, out)
+
+    def test_the_hash_names_the_content(self):
+        with emu.directory() as directory:
+            texts = [rig(guard.MPC), rig(guard.MPC) + "# a remark", rig(guard.MPC, margin=1)]
+            hashes = [next(row for row in guard.run("check", config_file(directory, text))[1].splitlines() if "hash" in row)
+                      for text in texts]
+            self.assertEqual(hashes[0], hashes[1])
+            self.assertNotEqual(hashes[0], hashes[2])
+
+    def test_explain(self):
+        with emu.directory() as directory:
+            conf = config_file(directory, rig(guard.MPC, keepouts=guard.POST, high=20000))
+            for status, words, *args in (
+                    (0, ["allowed", "straight within"], "--from", "0,0,0", "line 4000 100 0 speed 15"),
+                    (4, ["refused (keep-out)", "post"], "--from", "0,0,0", "line 4000 4000 0 speed 15"),
+                    (4, ["refused (limit)", "20,001.0 um", "20,000.0 um"], "--from", "0,0,0", "move 20001 0 0"),
+                    (4, ["refused (range)"], "--from", "0,0,0", "move -1 0 0"),
+                    (4, ["refused (level)"], "--from", "0,0,0", "line 1 1 1 speed 16"),
+                    (4, ["refused (hidden)"], "--from", "0,0,0", "home"),
+                    (4, ["refused (drive-value)"], "select 2"),
+                    (0, ["allowed"], "select 1"),
+                    (0, ["allowed"], "position"),
+                    (4, ["refused (stream)"], "stream-on")):
+                code, out, err = guard.run("explain", conf, *args)
+                self.assertEqual((args, code, err), (args, status, ""))
+                for word in words:
+                    self.assertIn(word, out)
+            for words, *args in ((["no such command", "line", "move"], "--from", "0,0,0", "fly 1 2 3"),
+                                 (["where from?"], "move 1 2 3"),
+                                 (["where from?"], "--from", "1,2", "move 1 2 3"),
+                                 (["a coordinate is missing"], "--from", "1,2,3", "move 1 2"),
+                                 (["something behind"], "--from", "1,2,3", "move 1 2 3 4"),
+                                 (["'speed' and its level"], "--from", "1,2,3", "line 1 2 3"),
+                                 (["drive 2 is not in the configuration"], "--drive", "2", "--from", "1,2,3", "move 1 2 3")):
+                code, out, err = guard.run("explain", conf, *args)
+                self.assertEqual((args, code, out), (args, 2, ""))
+                for word in words:
+                    self.assertIn(word, err)
+
+
+class Killed(unittest.TestCase):
+    """kill -9 in mid-move, of each, in every order of starting again: locked or disarmed, and nothing moves by itself."""
+
+    def setUp(self):
+        stack = emu.contextlib.ExitStack()
+        self.addCleanup(stack.close)
+        self.directory = stack.enter_context(emu.directory())
+        self.device_link = self.directory + "/emu"
+        self.emulator = emu.Emulator("mpc", "--link", self.device_link)
+        self.addCleanup(lambda: self.emulator.stop(signal.SIGKILL))
+        self.guard = Guard(self.directory, self.device_link, rig(guard.MPC))
+        self.addCleanup(lambda: self.guard.stop(signal.SIGKILL))
+        self.start_host()
+        self.addCleanup(self.kill_host)
+
+    def start_host(self):
+        """A host of its own, so that it can be killed: it writes what it is given, until then."""
+        self.host = subprocess.Popen(["/bin/sh", "-c", 'exec cat >"$0"', self.guard.link], stdin=subprocess.PIPE)
+        emu.wait_until(lambda: self.guard.status()["host_open"], "the host")
+
+    def kill_host(self):
+        self.host.kill()
+        self.host.wait()
+        self.host.stdin.close()
+
+    def start_move(self):
+        self.guard.arm()
+        self.host.stdin.write(line(0, 2000, 0, 0))
+        self.host.stdin.flush()
+        self.guard.wait_for("moving")
+        guard.pause(0.1) # until the whole frame is there: it has a pause of 35 ms within
+
+    def restart_device(self):
+        self.emulator = emu.Emulator("mpc", "--link", self.device_link)
+
+    def nothing_moves(self):
+        self.guard.wait_for("disarmed")
+        with emu.Port(self.guard.path) as port:
+            first = position_mpc(port.ask(b"C", 14))
+            guard.pause(0.1)
+            self.assertEqual(position_mpc(port.ask(b"C", 14)), first)
+        self.assertLess(first[0], 1900)
+        self.assertEqual(self.guard.status()["fault"], "none")
+
+    def test_the_guard(self):
+        self.start_move()
+        self.guard.kill()
+        self.assertTrue(os.path.islink(self.guard.link)) # left over
+        self.guard.start()
+        self.nothing_moves()
+        with open(self.guard.log, encoding="utf-8") as file:
+            self.assertIn("^C: the guard was not stopped in order before", file.read())
+        self.assertEqual(guard.run("log", self.guard.log)[0], 0)
+        self.guard.arm()
+
+    def test_the_guard_within_a_frame(self):
+        """The controller waits for the rest of the frame, and a person has to switch it off and on."""
+        self.guard.arm()
+        self.host.stdin.write(line(0, 2000, 0, 0))
+        self.host.stdin.flush()
+        self.guard.wait_for("moving")
+        self.guard.kill()
+        self.guard.start("locked")
+        emu.wait_until(lambda: self.guard.status()["fault"] == "device-silent", "the fault")
+        self.emulator.stop(signal.SIGKILL)
+        emu.wait_until(lambda: self.guard.status()["fault"] == "no-device", "the device to go")
+        self.restart_device()
+        self.nothing_moves()
+
+    def test_the_host(self):
+        self.start_move()
+        self.kill_host()
+        self.nothing_moves()
+
+    def test_the_device(self):
+        self.start_move()
+        self.emulator.stop(signal.SIGKILL)
+        self.guard.wait_for("locked")
+        self.assertEqual(self.guard.status()["fault"], "no-device")
+        self.assertIn("gone", self.guard.status()["device_says"])
+        self.restart_device()
+        self.nothing_moves()
+
+    def test_the_guard_and_the_device_in_both_orders(self):
+        for device_first in (True, False):
+            with self.subTest(device_first=device_first):
+                self.start_move()
+                self.guard.kill()
+                self.emulator.stop(signal.SIGKILL)
+                if device_first:
+                    self.restart_device()
+                    self.guard.start()
+                else:
+                    self.guard.start("locked")
+                    self.assertIn(self.device_link, self.guard.status()["device_says"])
+                    self.restart_device()
+                self.nothing_moves()
+                self.kill_host()
+                self.start_host()
+
+    def test_the_guard_and_the_host_in_both_orders(self):
+        for host_first in (True, False):
+            with self.subTest(host_first=host_first):
+                self.start_move()
+                if host_first:
+                    self.kill_host()
+                    self.guard.kill()
+                else:
+                    self.guard.kill()
+                    self.kill_host()
+                self.guard.start()
+                self.nothing_moves()
+                self.start_host()
+
+    def test_the_host_and_the_device_in_both_orders(self):
+        for host_first in (True, False):
+            with self.subTest(host_first=host_first):
+                self.start_move()
+                self.emulator.stop(signal.SIGKILL)
+                self.kill_host()
+                if host_first:
+                    self.start_host()
+                    self.restart_device()
+                else:
+                    self.restart_device()
+                    self.start_host()
+                self.nothing_moves()
+
+    def test_a_controller_of_the_other_kind_comes_back(self):
+        self.emulator.stop(signal.SIGKILL)
+        self.guard.wait_for("locked")
+        self.emulator = emu.Emulator("trio", "--link", self.device_link)
+        emu.wait_until(lambda: self.guard.status()["fault"] in ("identity", "device-silent", "implausible"), "the refusal")
+        self.assertEqual(self.guard.status()["state"], "locked")
+
+
+if __name__ == "__main__":
+    unittest.main()
