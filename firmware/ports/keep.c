@@ -147,11 +147,15 @@ bool dr_keep_step(dr_keep *keep, const dr_controller *c, dr_us now, dr_us *when)
     if (dr_port_slots() == 0)
         return false;
     if (keep->is_writing) {
+        const size_t count = record_bytes(c->drive_count);
         const uint16_t next = (uint16_t)((keep->newest + 1u) % dr_port_slots());
-        if (dr_port_slot_write(next, keep->record, record_bytes(c->drive_count))) {
+        if (dr_port_slot_write(next, keep->record, count)) {
             keep->newest = next;
-            keep->serial++;
-            keep->is_writing = false;
+            const bool holds = is_as_kept(keep, count);
+            if (holds)
+                keep->serial++;
+            keep->tries = holds ? 0u : (uint16_t)(keep->tries + 1u);
+            keep->is_writing = !holds && keep->tries < dr_port_slots(); /* worn out: the next one */
         }
         return true;
     }

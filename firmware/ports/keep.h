@@ -17,8 +17,9 @@ extern "C" {
 
 typedef struct {
     uint8_t record[DR_PORT_SLOT_BYTES]; /* the one that is being written */
-    uint16_t newest;                    /* slot of the record that counts; no slot yet: the last one */
+    uint16_t newest;                    /* slot of the record that counts, or of the last one that was tried */
     uint16_t serial;                    /* its number */
+    uint16_t tries;                     /* slots that did not hold what was written to them */
     dr_us since;                        /* when things last changed; counts while is_changed */
     bool is_changed, is_moving, is_writing;
 } dr_keep;

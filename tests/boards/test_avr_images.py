@@ -5,11 +5,13 @@
 Expected answers are typed from PROTOCOL.md and the manuals [T] and [M]. Times are microseconds of the board's clock from its
 start. 57600 baud at 16 MHz are 57143, 128000 are 125000.
 """
-import subprocess
 import sys
 import tempfile
 import unittest
 from pathlib import Path
+
+import images
+from images import between, point, spaced
 
 RUNNER, IMAGES, BOARD = (sys.argv.pop(1) for _ in range(3))
 MCU = {"uno": "atmega328p", "mega": "atmega2560", "leonardo": "atmega32u4"}[BOARD]
@@ -18,26 +20,8 @@ READY_US = 2_500_000  # a Leonardo is enumerated by then, and a TRIO has calibra
 
 
 def run(controller, events, memory=None):
-    """What the board sends: a list of (us, byte). Events: (us, bytes to send or "stop" or "off")."""
-    script = "".join(f"{us} {what if isinstance(what, str) else what.hex(' ')}\n" for us, what in events)
-    command = [RUNNER, *(["--usb"] if IS_USB else []), *(["--memory", memory] if memory else []), "--script", "-", MCU,
-               str(Path(IMAGES, f"{BOARD}-{controller}.elf"))]
-    done = subprocess.run(command, input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=300)
-    if done.returncode:
-        raise AssertionError(done.stderr)
-    return [(int(us), int(byte, 16)) for us, byte in (line.split() for line in done.stdout.splitlines())]
-
-
-def point(x, y, z):
-    return b"".join(value.to_bytes(4, "little") for value in (x, y, z))
-
-
-def spaced(us, step_us, frames):
-    return [(us + i * step_us, frame) for i, frame in enumerate(frames)]
-
-
-def between(sent, first_us, last_us):
-    return bytes(byte for us, byte in sent if first_us <= us < last_us)
+    return images.run([RUNNER, *(["--usb"] if IS_USB else []), *(["--memory", memory] if memory else []), "--script", "-", MCU,
+                       str(Path(IMAGES, f"{BOARD}-{controller}.elf"))], events)
 
 
 class Commands(unittest.TestCase):

@@ -31,6 +31,7 @@ static uint32_t writes_left; /* bytes until the power is cut */
 static uint32_t writes;
 static uint8_t garbage; /* what a byte holds whose writing was cut off */
 static bool is_dead;
+static uint16_t worn_slots; /* bits: what is written there does not stay */
 static uint32_t waits;
 
 uint8_t dr_port_begin(void) { return straps; }
@@ -92,7 +93,7 @@ bool dr_port_slot_write(uint16_t slot, const uint8_t *bytes, size_t count)
     }
     writes_left--;
     writes++;
-    memory[slot][at] = bytes[at];
+    memory[slot][at] = (uint8_t)((worn_slots >> slot & 1) != 0 ? 0 : bytes[at]);
     at = at + 1 < count ? at + 1 : 0;
     return at == 0;
 }
@@ -148,6 +149,7 @@ void setUp(void)
     writes_left = UINT32_MAX;
     writes = 0;
     garbage = 0;
+    worn_slots = 0;
     memset(memory, 0xFF, sizeof memory);
 }
 
@@ -421,6 +423,25 @@ static void a_power_cut_leaves_the_old_record_or_the_new_one(void)
         }
 }
 
+static void a_worn_out_slot_is_passed_over_and_a_dead_memory_is_left_alone(void)
+{
+    straps = DR_STRAP_KEEP;
+    worn_slots = 1u << 0 | 1u << 2;
+    for (uint8_t i = 1; i < 20; i++) {
+        const uint8_t x_to[5] = {'x', i};
+        switch_on();
+        ask(x_to, 5, 4 * DR_US_PER_S);
+        switch_on();
+        ask("c", 1, 10000);
+        TEST_ASSERT_EQUAL_HEX8(i, output[0].byte);
+    }
+    worn_slots = (1u << SLOTS) - 1u;
+    writes = 0;
+    ask("x\xEE\0\0\0", 5, 9 * DR_US_PER_S);
+    TEST_ASSERT_GREATER_THAN_UINT32(0, writes);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(SLOTS * DR_PORT_SLOT_BYTES, writes);
+}
+
 static void a_board_without_memory_works_all_the_same(void)
 {
     slots = 0;
@@ -450,6 +471,7 @@ int main(void)
     RUN_TEST(nothing_is_written_while_nothing_changes_or_something_moves);
     RUN_TEST(slots_are_written_in_turn_and_serial_numbers_wrap);
     RUN_TEST(a_power_cut_leaves_the_old_record_or_the_new_one);
+    RUN_TEST(a_worn_out_slot_is_passed_over_and_a_dead_memory_is_left_alone);
     RUN_TEST(a_board_without_memory_works_all_the_same);
     return UNITY_END();
 }

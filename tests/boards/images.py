@@ -1,0 +1,23 @@
+"""What the tests of images share: a run of a simulator on a script, and a few bytes."""
+import subprocess
+
+
+def run(command, events):
+    """What the board sends: a list of (us, byte). Events: (us, bytes to send or "stop" or "off")."""
+    script = "".join(f"{us} {what if isinstance(what, str) else what.hex(' ')}\n" for us, what in events)
+    done = subprocess.run(command, input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=280)
+    if done.returncode:
+        raise AssertionError(done.stderr)
+    return [(int(us), int(byte, 16)) for us, byte in (line.split() for line in done.stdout.splitlines())]
+
+
+def point(x, y, z):
+    return b"".join(value.to_bytes(4, "little") for value in (x, y, z))
+
+
+def spaced(us, step_us, frames):
+    return [(us + i * step_us, frame) for i, frame in enumerate(frames)]
+
+
+def between(sent, first_us, last_us):
+    return bytes(byte for us, byte in sent if first_us <= us < last_us)
