@@ -38,7 +38,7 @@ static const lint_words words[LINT_RULES] = {
                                "^C and read its CR."},
     [LINT_UNREAD_REPLY] =
         {"unread-reply", "An answer, or a part of one, was left unread.",
-         "[T] tables 6 and note 3, [M] table 9 and note 3",
+         "[T] table 6 and note 3, [M] table 9 and note 3",
          "Read exactly as many bytes as the command answers, and clear the buffers before a command."},
     [LINT_WRONG_COMMAND] = {"wrong-command", "A command was sent that this controller, or its firmware, does not have.",
                             "[T] table 6, [M] table 9",
@@ -488,6 +488,7 @@ static lint_station *station_of(lint *l, const observation *seen)
     memset(s, 0, sizeof *s);
     s->ins = seen->ins;
     s->kind = (dr_kind)seen->ins->controller.kind;
+    s->firmware = seen->ins->controller.firmware;
     (void)snprintf(s->name, sizeof s->name, "%s", seen->name);
     dr_framer_reset(&s->framer);
     return s;

@@ -65,6 +65,7 @@ typedef struct {
     const instrument *ins;
     char name[64];
     dr_kind kind;
+    uint16_t firmware;
     dr_framer framer;    /* the host's bytes as written */
     uint64_t began_ns;   /* the command in the framer: when its first byte was written */
     uint32_t pause_us;   /* within it */

@@ -5,9 +5,11 @@
  *                                             observers: trace, ...
  *     engine: the loop and the clock            control: commands while it runs      child: the command of `run`
  */
-#define _GNU_SOURCE  /* signalfd, mkdtemp */
-#include "child.h"   /* the command of `run` */
-#include "engine.h"  /* the loop */
+#define _GNU_SOURCE /* signalfd, mkdtemp */
+#include "child.h"  /* the command of `run` */
+#include "engine.h" /* the loop */
+#include "lint.h"   /* which rules the host breaks */
+#include "lint_report.h"
 #include "options.h" /* what was asked for */
 #include "trace.h"   /* what happens, in words */
 
@@ -24,6 +26,7 @@
 #include <unistd.h>
 
 #define PATH_ROOM 512u
+#define EXIT_FINDINGS 3 /* --strict */
 
 typedef struct {
     source signals; /* the first, see on_signal() */
@@ -31,6 +34,9 @@ typedef struct {
     engine e;
     trace trace;
     observer_link *trace_links;
+    lint lint;
+    observer_link *lint_links;
+    FILE *lint_json, *lint_junit;
     int signal_fd;
     sigset_t mask_before;
     pid_t child; /* 0: none */
@@ -227,7 +233,8 @@ static bool set_up(program *p)
     e->station_count = o->rig.count;
     e->stations = calloc(o->rig.count, sizeof *e->stations);
     p->trace_links = calloc(o->rig.count, sizeof *p->trace_links);
-    if (e->stations == NULL || p->trace_links == NULL)
+    p->lint_links = calloc(o->rig.count, sizeof *p->lint_links);
+    if (e->stations == NULL || p->trace_links == NULL || p->lint_links == NULL)
         return false;
     for (unsigned i = 0; i < e->station_count; i++) {
         station *const s = &e->stations[i];
@@ -253,11 +260,53 @@ static bool open_trace(program *p)
     return true;
 }
 
+static bool open_report(const char *option, const char *path, FILE **file)
+{
+    if (path == NULL || (*file = fopen(path, "we")) != NULL)
+        return true;
+    (void)fprintf(stderr, "dryrig-emu: --%s %s: %s\n", option, path, strerror(errno));
+    return false;
+}
+
+static bool open_lint(program *p)
+{
+    if (!p->o->lints)
+        return true;
+    lint_open(&p->lint);
+    for (unsigned i = 0; i < p->e.station_count; i++) {
+        p->lint_links[i].who = &p->lint.base;
+        station_observe(&p->e.stations[i], &p->lint_links[i]);
+    }
+    return open_report("lint-json", p->o->lint_json, &p->lint_json) &&
+           open_report("lint-junit", p->o->lint_junit, &p->lint_junit);
+}
+
+static void close_report(const char *path, FILE *file, bool done)
+{
+    if (file != NULL && (fclose(file) != 0 || !done))
+        (void)fprintf(stderr, "dryrig-emu: %s is incomplete: %s\n", path, strerror(errno));
+}
+
+/* All has been observed. */
+static void report_lint(program *p)
+{
+    if (!p->o->lints)
+        return;
+    (void)lint_report_text(&p->lint, stderr); /* who has closed stderr does not want to know */
+    if (p->lint_json != NULL)
+        close_report(p->o->lint_json, p->lint_json, lint_report_json(&p->lint, p->lint_json));
+    if (p->lint_junit != NULL)
+        close_report(p->o->lint_junit, p->lint_junit, lint_report_junit(&p->lint, p->lint_junit));
+    if (p->o->is_strict && p->status == 0 && lint_total(&p->lint) > 0)
+        p->status = EXIT_FINDINGS;
+    lint_close(&p->lint);
+}
+
 /* The ports are open, the links are made. */
 static void start_and_run(program *p)
 {
     p->status = 1;
-    if (!open_trace(p))
+    if (!open_trace(p) || !open_lint(p))
         return;
     const bool has_command = p->o->task == TASK_RUN;
     if (!has_command)
@@ -290,6 +339,7 @@ static int run(program *p)
         start_and_run(p);
         engine_close(&p->e);
         trace_close(&p->trace);
+        report_lint(p);
     } else {
         (void)fprintf(stderr, "dryrig-emu: %s\n", why);
         p->status = 1;

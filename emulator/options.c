@@ -16,7 +16,7 @@ typedef struct {
     setup_text one; /* the controller */
     const char *words[3];
     unsigned word_count;
-    const char *link, *clock, *speedup, *seed, *rig;
+    const char *link, *clock, *speedup, *seed, *rig, *lint;
 } typed;
 
 const char *argp_program_version = "dryrig-emu " DRYRIG_VERSION;
@@ -51,7 +51,11 @@ enum {
     CONTROL,
     DO,
     SEED,
-    RIG_FILE
+    RIG_FILE,
+    LINT,
+    LINT_JSON,
+    LINT_JUNIT,
+    STRICT
 };
 
 static const struct argp_option known[] = {
@@ -93,6 +97,11 @@ static const struct argp_option known[] = {
      "Make a socket PATH that takes commands: 'dryrig-emu ctl PATH help', see dryrig-control(7)", 5},
     {"do", DO, "COMMAND", 0, "Do this at the start, in the same language; may be repeated", 5},
     {"seed", SEED, "N", 0, "Where chance begins (default: another one each time)", 5},
+    {"lint", LINT, "on|off", OPTION_ARG_OPTIONAL,
+     "At the end, say on stderr which rules of the protocol the host has broken (default with run: on)", 6},
+    {"lint-json", LINT_JSON, "FILE", 0, "Write all of it to FILE as JSON", 6},
+    {"lint-junit", LINT_JUNIT, "FILE", 0, "Write it to FILE as JUnit XML", 6},
+    {"strict", STRICT, NULL, 0, "With run: exit status 3 where COMMAND's is 0 and there are findings", 6},
     {"rig", RIG_FILE, "FILE", 0, "With run: the controllers of a rig file", 5},
     {NULL, 0, NULL, 0, NULL, 0}};
 
@@ -169,6 +178,18 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case RIG_FILE:
         once(state, &t->rig, "rig", value);
         break;
+    case LINT:
+        once(state, &t->lint, "lint", value != NULL ? value : "on");
+        break;
+    case LINT_JSON:
+        once(state, &t->o->lint_json, "lint-json", value);
+        break;
+    case LINT_JUNIT:
+        once(state, &t->o->lint_junit, "lint-junit", value);
+        break;
+    case STRICT:
+        t->o->is_strict = true;
+        break;
     case ARGP_KEY_ARG:
         if (t->word_count == sizeof t->words / sizeof t->words[0])
             argp_error(state, "'%s' is one word too many", value);
@@ -222,6 +243,18 @@ static clock_mode read_clock(const char *text)
         if (text == NULL || strcasecmp(text, names[i]) == 0)
             return (clock_mode)i;
     refuse("--clock %s: expected real, step or jump", text);
+}
+
+static void read_lint(options *o, const char *text)
+{
+    const bool off = text != NULL && strcasecmp(text, "off") == 0;
+    if (text != NULL && !off && strcasecmp(text, "on") != 0)
+        refuse("--lint=%s: expected on or off", text);
+    o->lints = !off && (text != NULL || o->task == TASK_RUN || o->lint_json != NULL || o->lint_junit != NULL);
+    if (off && (o->is_strict || o->lint_json != NULL || o->lint_junit != NULL))
+        refuse("--lint=off leaves nothing for --strict, --lint-json and --lint-junit");
+    if (o->is_strict && o->task != TASK_RUN)
+        refuse("--strict is about the exit status of a command: dryrig-emu run ... --strict -- COMMAND");
 }
 
 static void read_one(options *o, const typed *t, bool is_paced_by_default)
@@ -280,7 +313,8 @@ options options_read(int argc, char **argv)
         "Prints 'ready' and the port's path, and runs until SIGINT, SIGTERM or SIGHUP.\n"
         "With run: prints nothing, and runs as long as COMMAND does, which finds the port's path in DRYRIG_PORT.\v"
         "Exit status: 0 stopped by a signal, 1 the port, the link or the trace cannot be had, 2 wrong options. With "
-        "run: that of COMMAND; 126 it cannot be executed, 127 it is not there, 128+N signal N ended it.",
+        "run: that of COMMAND; 126 it cannot be executed, 127 it is not there, 128+N signal N ended it; 3 with "
+        "--strict.",
         NULL,
         NULL,
         NULL};
@@ -309,6 +343,7 @@ options options_read(int argc, char **argv)
         read_rig(&o, &t, o.clock == CLOCK_REAL);
     else
         read_one(&o, &t, o.clock == CLOCK_REAL);
+    read_lint(&o, t.lint);
     read_seed(&o, t.seed);
     return o;
 }

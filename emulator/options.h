@@ -22,8 +22,11 @@ typedef struct {
     clock_mode clock;
     unsigned speedup; /* 1 to SPEEDUP_MAX */
     bool waits_for_client;
-    const char *trace;   /* NULL: none; "-": stderr */
-    const char *control; /* NULL: none */
+    const char *trace;                  /* NULL: none; "-": stderr */
+    bool lints;                         /* tells at the end which rules the host has broken */
+    const char *lint_json, *lint_junit; /* files for the same; NULL: none */
+    bool is_strict;                     /* TASK_RUN: findings turn the command's exit status 0 into 3 */
+    const char *control;                /* NULL: none */
     const char *dos[OPTIONS_DO_MAX];
     unsigned do_count;
     uint64_t seed;
