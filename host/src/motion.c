@@ -7,6 +7,7 @@
 
 #include "dr_words.h" /* dr_words_controller */
 
+#include <stdio.h>
 #include <string.h>
 
 #define EARLY 0.4                     /* of the documented time: real units were seen to be 2.1 times faster [P] */
@@ -236,16 +237,30 @@ static int wait_for_end(dryrig *d, const plan *p, watch *w, uint64_t until_us)
 
 /* -- Arrival ------------------------------------------------------------------------------------------------------- */
 
+typedef struct {
+    char text[128];
+} place;
+
+/* Where it stands, for people: in microns too where the stage is known. */
+static place place_of(const dryrig_position *at)
+{
+    place p;
+    const int32_t *steps = at->steps;
+    const int length = snprintf(p.text, sizeof p.text, "%d, %d, %d steps", steps[0], steps[1], steps[2]);
+    if (at->has_um && length > 0)
+        (void)snprintf(p.text + length, sizeof p.text - (size_t)length, " (%.3f, %.3f, %.3f um)", at->um[0], at->um[1],
+                       at->um[2]);
+    return p;
+}
+
 static int judge(dryrig *d, const plan *p, const watch *w, const dryrig_position *end)
 {
     if (w->stops > 0) {
         __atomic_store_n(&d->interrupted, 0, __ATOMIC_SEQ_CST);
-        return fail(d, DRYRIG_ERR_INTERRUPTED, "interrupted; the stage stands at %d, %d, %d steps", (int)end->steps[0],
-                    (int)end->steps[1], (int)end->steps[2]);
+        return fail(d, DRYRIG_ERR_INTERRUPTED, "interrupted; the stage stands at %s", place_of(end).text);
     }
     if (w->by_hand)
-        return fail(d, DRYRIG_ERR_STOPPED, "STOP was pressed on the ROE; the stage stands at %d, %d, %d steps",
-                    (int)end->steps[0], (int)end->steps[1], (int)end->steps[2]);
+        return fail(d, DRYRIG_ERR_STOPPED, "STOP was pressed on the ROE; the stage stands at %s", place_of(end).text);
     const bool moved = !same_place(&p->start, end);
     bool exact = true, near = true;
     for (size_t axis = 0; axis < DR_AXES; axis++) {
@@ -267,10 +282,10 @@ static int judge(dryrig *d, const plan *p, const watch *w, const dryrig_position
     if (!moved)
         return fail(d, DRYRIG_ERR_STOOD_STILL, "the stage stood still%s",
                     is_small(d, p) ? ": this controller ignores moves of under 16 steps" : "");
-    return fail(d, DRYRIG_ERR_ELSEWHERE,
-                "the stage stands at %d, %d, %d steps, not at its target: stopped on the "
-                "controller, blocked, or an older move was resumed",
-                (int)end->steps[0], (int)end->steps[1], (int)end->steps[2]);
+    return fail(
+        d, DRYRIG_ERR_ELSEWHERE,
+        "the stage stands at %s, not at its target: stopped on the controller, blocked, or an older move was resumed",
+        place_of(end).text);
 }
 
 /* No CR within the limit. What can be stopped is stopped: it has overrun all margins. */
@@ -297,8 +312,8 @@ static int overdue(dryrig *d, const plan *p, const watch *w, dryrig_position *en
         return result;
     if (w->stops > 0)
         return judge(d, p, w, end);
-    return fail(d, DRYRIG_ERR_TIMEOUT, "no CR within %u.%03u s; ^C was sent, and the stage stands at %d, %d, %d steps",
-                waited_ms / 1000u, waited_ms % 1000u, (int)end->steps[0], (int)end->steps[1], (int)end->steps[2]);
+    return fail(d, DRYRIG_ERR_TIMEOUT, "no CR within %u.%03u s; ^C was sent, and the stage stands at %s",
+                waited_ms / 1000u, waited_ms % 1000u, place_of(end).text);
 }
 
 static int run(dryrig *d, const plan *p, dryrig_position *end)
