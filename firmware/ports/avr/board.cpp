@@ -3,7 +3,6 @@
 #include "port.h"
 
 #include <Arduino.h>
-#include <avr/eeprom.h>
 
 static const uint8_t strap_pins[] = {2, 3, 4, 5}; /* DR_STRAP_* from the lowest bit on: closed is connected to ground */
 
@@ -63,30 +62,6 @@ void dr_port_write(const uint8_t *bytes, size_t count) { (void)Serial.write(byte
 bool dr_port_has_pace(void) { return true; }
 
 #endif
-
-uint16_t dr_port_slots(void) { return (E2END + 1u) / DR_PORT_SLOT_BYTES; }
-
-static uint16_t address(uint16_t slot) { return (uint16_t)(slot * DR_PORT_SLOT_BYTES); }
-
-void dr_port_slot_read(uint16_t slot, uint8_t *bytes, size_t count)
-{
-    eeprom_read_block(bytes, reinterpret_cast<const void *>(address(slot)), count);
-}
-
-/* A byte takes 3.4 ms, which is longer than the line may be left alone: one a call, and only when the last one is done. */
-bool dr_port_slot_write(uint16_t slot, const uint8_t *bytes, size_t count)
-{
-    static uint8_t at;
-    if (!eeprom_is_ready())
-        return false;
-    if (at == count) {
-        at = 0;
-        return true;
-    }
-    eeprom_update_byte(reinterpret_cast<uint8_t *>(address(slot) + at), bytes[at]);
-    at++;
-    return false;
-}
 
 void setup() { dr_emulator_begin(); }
 void loop() { dr_emulator_step(); }
