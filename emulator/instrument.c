@@ -5,13 +5,10 @@
 
 /* -- Time ------------------------------------------------------------------------------------------------------------ */
 
-/* The controller's 32-bit clock. */
-static dr_us now_of(const instrument *ins) { return (dr_us)ins->now_us; }
-
 /* An instant of the controller's clock that lies ahead; one that has passed is now. */
 static uint64_t ahead(const instrument *ins, dr_us when)
 {
-    return dr_us_before(when, now_of(ins)) ? ins->now_us : ins->now_us + (dr_us)(when - now_of(ins));
+    return dr_us_before(when, instrument_now(ins)) ? ins->now_us : ins->now_us + (dr_us)(when - instrument_now(ins));
 }
 
 static bool earlier(bool have, uint64_t candidate, uint64_t *when)
@@ -51,11 +48,12 @@ static instrument_sending next_to_send(instrument *ins)
 
     bool first;
     const dr_op op = dr_controller_answering(c, &first);
-    if ((ins->quirks & INSTRUMENT_STOP_SAYS_I) != 0 && is_interrupt(op) && !ins->said_i)
+    if ((ins->quirks & INSTRUMENT_STOP_SAYS_I) != 0 &&
+        ((is_interrupt(op) && !ins->said_i) || dr_controller_answers_stop(c)))
         return INSTRUMENT_LETTER_I;
     if ((ins->quirks & INSTRUMENT_POSITION_13) != 0 && op == DR_OP_MPC_POSITION && first) {
         uint8_t drive; /* never gets onto the line */
-        (void)dr_controller_pull(c, now_of(ins), &drive, 1);
+        (void)dr_controller_pull(c, instrument_now(ins), &drive, 1);
     }
     return INSTRUMENT_REPLY;
 }
@@ -76,17 +74,20 @@ static size_t finish_byte(instrument *ins, uint8_t *bytes, size_t room)
     const uint8_t sent = ins->sending;
     size_t count = 1;
     ins->sending = INSTRUMENT_NOTHING;
-    ins->said_i = sent == INSTRUMENT_LETTER_I;
+    ins->said_i = sent == INSTRUMENT_LETTER_I && !dr_controller_answers_stop(&ins->controller);
     switch (sent) {
-    case INSTRUMENT_LETTER_I:
+    case INSTRUMENT_LETTER_I: /* before the CR, or in its place */
+        count = dr_controller_ready(&ins->controller) > 0 ? 1 : 0;
+        if (dr_controller_answers_stop(&ins->controller))
+            (void)dr_controller_pull(&ins->controller, instrument_now(ins), bytes, 1);
         bytes[0] = LETTER_I;
         break;
     case INSTRUMENT_NUL:
         bytes[0] = 0;
         break;
     default: /* where bytes take no time, all leave at once, but not across the edge of a reply that a quirk changes */
-        count =
-            dr_controller_pull(&ins->controller, now_of(ins), bytes, ins->byte_num == 0 && ins->quirks == 0 ? room : 1);
+        count = dr_controller_pull(&ins->controller, instrument_now(ins), bytes,
+                                   ins->byte_num == 0 && ins->quirks == 0 ? room : 1);
         break;
     }
     ins->to_host.bytes += count;
@@ -99,7 +100,7 @@ static bool beat_due(const instrument *ins, uint64_t *when_us)
     const dr_controller *c = &ins->controller;
     if ((ins->quirks & INSTRUMENT_NUL_HEARTBEAT) == 0 || c->state != DR_STATE_MOVING || c->move_op != DR_OP_MPC_MOVE)
         return false;
-    const dr_us gone = now_of(ins) - c->leg_began;
+    const dr_us gone = instrument_now(ins) - c->leg_began;
     const dr_us past = gone % BEAT_US;
     const bool is_now = past == 0 && gone > 0 && ins->beat_us != ins->now_us;
     *when_us = is_now ? ins->now_us : ins->now_us - past + BEAT_US;
@@ -128,7 +129,8 @@ void instrument_start(instrument *ins, uint64_t now_us)
     ins->said_i = false;
     ins->beat_us = now_us;
     ins->arriving_first = ins->arriving_count = 0;
-    dr_controller_start(&ins->controller, now_of(ins));
+    dr_controller_start(&ins->controller, instrument_now(ins));
+    dr_panel_init(&ins->panel, &ins->controller, ins->panel_drives);
 }
 
 size_t instrument_room(const instrument *ins) { return INSTRUMENT_LINE_MAX - ins->arriving_count; }
@@ -155,7 +157,7 @@ static void arrive(instrument *ins)
     ins->from_host.bytes++;
     if (ins->arriving[at].pause_us > 0)
         dr_controller_paused(&ins->controller, ins->arriving[at].pause_us);
-    dr_controller_push(&ins->controller, now_of(ins), &ins->arriving[at].byte, 1);
+    dr_controller_push(&ins->controller, instrument_now(ins), &ins->arriving[at].byte, 1);
 }
 
 static bool arrival_due(const instrument *ins, uint64_t *when_us)
@@ -165,13 +167,21 @@ static bool arrival_due(const instrument *ins, uint64_t *when_us)
     return ins->arriving_count > 0;
 }
 
-bool instrument_due(const instrument *ins, uint64_t *when_us)
+static bool hands_or_controller_due(const instrument *ins, uint64_t *when_us)
 {
     bool have = false;
     dr_us at;
-    uint64_t when;
     if (dr_controller_due(&ins->controller, &at))
         have = earlier(have, ahead(ins, at), when_us);
+    if (dr_panel_due(&ins->panel, &at))
+        have = earlier(have, ahead(ins, at), when_us);
+    return have;
+}
+
+bool instrument_due(const instrument *ins, uint64_t *when_us)
+{
+    bool have = hands_or_controller_due(ins, when_us);
+    uint64_t when;
     if (ins->sending != INSTRUMENT_NOTHING)
         have = earlier(have, through_us(ins, &ins->to_host, ins->to_host.bytes + 1u), when_us);
     else if (dr_controller_ready(&ins->controller) > 0) /* hands have made it answer since the last run */
@@ -183,14 +193,14 @@ bool instrument_due(const instrument *ins, uint64_t *when_us)
     return have;
 }
 
-/* Does the first thing that is to be done at now_us. Returns how many bytes have left. */
+/* Does the first thing that is to be done at now_us. Returns how many bytes have left. As each instant is visited, the panel
+ * is settled whenever the controller is called. */
 static size_t step(instrument *ins, uint8_t *bytes, size_t room)
 {
     size_t count = 0;
-    dr_us at;
     uint64_t when;
-    if (dr_controller_due(&ins->controller, &at) && ahead(ins, at) == ins->now_us)
-        dr_controller_push(&ins->controller, now_of(ins), NULL, 0); /* settles what is due */
+    if (hands_or_controller_due(ins, &when) && when == ins->now_us)
+        dr_panel_settle(&ins->panel, instrument_now(ins));
     else if (ins->sending != INSTRUMENT_NOTHING &&
              through_us(ins, &ins->to_host, ins->to_host.bytes + 1u) == ins->now_us)
         count = finish_byte(ins, bytes, room);

@@ -1,5 +1,5 @@
-/* instrument: one instrument as a host sees it: the controller, quirks that change the bytes of its replies, and a serial
- * line that is paced in both directions.
+/* instrument: one instrument as a host and hands find it: the controller, its panel, quirks that change the bytes of its
+ * replies, and a serial line that is paced in both directions.
  *
  * No OS calls and no clock: time is an argument, in whole microseconds of the controller's own clock, 64 bits wide so that
  * it never wraps (the controller inside gets the lower 32). The caller owns the struct; nothing is allocated.
@@ -9,7 +9,7 @@
  *
  * The instrument visits every instant at which something happens, so how finely the caller steps changes nothing: the same
  * bytes leave at the same instants. Within one instant the order is: what the controller does by itself (legs end,
- * positions are streamed), then the byte that leaves, then the heartbeat of its quirk, then the byte that arrives.
+ * positions are streamed, a button has been held long enough), then the byte that leaves, then the heartbeat of its quirk, then the byte that arrives.
  *
  * The line: a byte takes 10 bits [T table 3, M table 5] and leaves, or arrives, at the end of them. The bytes of one busy
  * period are counted from its start, so 57,600 baud (173.61 us a byte) does not drift; instants are rounded up. Unpaced, a
@@ -19,12 +19,12 @@
 #ifndef INSTRUMENT_H
 #define INSTRUMENT_H
 
-#include "dr_controller.h" /* the controller inside */
+#include "dr_panel.h" /* the controller inside, and its panel */
 
 /* Quirks of reply bytes; the controller's own are in controller.quirks [P, quirks]. */
 enum {
     INSTRUMENT_POSITION_13 = 1u << 0,  /* MPC: 'C' answers 13 bytes, without the drive */
-    INSTRUMENT_STOP_SAYS_I = 1u << 1,  /* ^C answers 'I', CR */
+    INSTRUMENT_STOP_SAYS_I = 1u << 1,  /* ^C answers 'I', CR; STOP on the ROE puts 'I' in the place of the move's CR */
     INSTRUMENT_NUL_HEARTBEAT = 1u << 2 /* MPC: 0x00 every 100 ms during 'M', where the line is free (chosen) */
 };
 
@@ -44,7 +44,12 @@ typedef struct {
     uint8_t quirks;           /* INSTRUMENT_*; may change at any time */
     bool is_paced;
 
+    /* Hands: dr_panel_...(&panel, instrument_now(ins), ...) between two calls of instrument_run(), which then sends what the
+     * controller answers. */
+    dr_panel panel;
+
     /* to be read by anybody, written by instrument only */
+    dr_panel_drive panel_drives[DR_PORTS];
     uint64_t now_us;             /* how far it has run */
     uint32_t byte_num, byte_den; /* a byte takes byte_num / byte_den us */
     instrument_line to_host, from_host;
@@ -60,6 +65,9 @@ typedef struct {
 
 /* Begins as one that has been on for a while. */
 void instrument_start(instrument *ins, uint64_t now_us);
+
+/* The present on the controller's clock of 32 bits. */
+static inline dr_us instrument_now(const instrument *ins) { return (dr_us)ins->now_us; }
 
 /* How many bytes it can take now. */
 size_t instrument_room(const instrument *ins);

@@ -300,6 +300,42 @@ static void stop_says_i_puts_an_i_before_the_cr(void)
     }
 }
 
+/* STOP during a host's move: 'I' alone, and the move's CR never comes. What was kept behind the move is answered next. */
+static void stop_says_i_puts_an_i_in_the_place_of_the_cr_that_the_stop_button_causes(void)
+{
+    uint8_t frame[DR_FRAME_MAX];
+    for (unsigned quirky = 0; quirky < 2; quirky++)
+        for (unsigned paced = 0; paced < 2; paced++) {
+            set_up(&b, DR_MPC, paced == 1, 0);
+            b.ins.quirks = quirky == 1 ? INSTRUMENT_STOP_SAYS_I : 0;
+            say(&b, frame, frame_of(frame, "M", 48000, 0, 0));
+            run_to(&b, 400000);
+            say(&b, "K", 1);
+            run_to(&b, 500000);
+            TEST_ASSERT_TRUE(dr_panel_press(&b.ins.panel, instrument_now(&b.ins), DR_BUTTON_STOP));
+            run_to(&b, 600000);
+            check_sent(&b, 0, 500000 + paced * 79, quirky == 1 ? 'I' : 0x0D);
+            check_sent(&b, 1, 500000 + paced * 157, 1); /* the line goes on without a gap */
+            TEST_ASSERT_EQUAL(5, b.logged);
+            TEST_ASSERT_TRUE(dr_panel_release(&b.ins.panel, instrument_now(&b.ins), DR_BUTTON_STOP));
+            say(&b, "\x03", 1); /* and ^C is answered as ever */
+            run_to(&b, 1000000);
+            TEST_ASSERT_EQUAL(6 + quirky, b.logged);
+            TEST_ASSERT_EQUAL_HEX8(0x0D, b.log[5 + quirky].byte);
+        }
+}
+
+static void an_i_that_was_leaving_when_the_power_went_does_not_leave(void)
+{
+    set_up(&b, DR_MPC, true, 0);
+    b.ins.quirks = INSTRUMENT_STOP_SAYS_I;
+    say(&b, "\x03", 1);
+    run_to(&b, 79 + 10);
+    dr_panel_power(&b.ins.panel, instrument_now(&b.ins), false);
+    run_to(&b, 5000);
+    TEST_ASSERT_EQUAL(0, b.logged);
+}
+
 static void nul_heartbeat_beats_every_100_ms_of_an_m(void)
 {
     uint8_t frame[DR_FRAME_MAX];
@@ -314,6 +350,34 @@ static void nul_heartbeat_beats_every_100_ms_of_an_m(void)
     say(&b, "H", 1);
     run_to(&b, 3000000);
     TEST_ASSERT_EQUAL(4, b.logged); /* no other move beats */
+}
+
+/* -- Hands -------------------------------------------------------------------------------------------------------------- */
+
+/* [T page 1]: held for 3 s, WORK stores where it is; the hold acts at that instant whenever one looks. */
+static void a_hold_acts_at_its_instant(void)
+{
+    uint64_t when;
+    set_up(&b, DR_TRIO, true, 7);
+    TEST_ASSERT_TRUE(dr_panel_press(&b.ins.panel, instrument_now(&b.ins), DR_BUTTON_WORK));
+    TEST_ASSERT_TRUE(instrument_due(&b.ins, &when));
+    TEST_ASSERT_EQUAL_UINT64(7 + 3000000, when);
+    run_to(&b, when - 1);
+    TEST_ASSERT_FALSE(b.drives[0].work_is_set);
+    run_to(&b, when);
+    TEST_ASSERT_TRUE(b.drives[0].work_is_set);
+    TEST_ASSERT_FALSE(instrument_due(&b.ins, &when));
+}
+
+/* The switches begin where the setup says. */
+static void the_panel_is_that_of_the_controller_that_was_set_up(void)
+{
+    set_up(&b, DR_MPC, true, 0);
+    b.drives[0].diagonal = 5;
+    b.drives[0].y_moves_home = true;
+    instrument_start(&b.ins, 0);
+    for (uint8_t number = 1; number <= 8; number++)
+        TEST_ASSERT_EQUAL(number != 2 && number != 4, dr_panel_switch_is_on(&b.ins.panel, DR_SWITCHES_REAR, 0, number));
 }
 
 /* -- The host's pauses -------------------------------------------------------------------------------------------------- */
@@ -363,7 +427,23 @@ static void go(bench *w, uint64_t until_us, style how)
     }
 }
 
-/* A host that says whatever it likes whenever it likes, mostly commands. The same for the same seed. */
+/* Somebody at the panel, who does whatever he likes. */
+static void play_hands(bench *w)
+{
+    dr_panel *const p = &w->ins.panel;
+    const dr_us now = instrument_now(&w->ins);
+    const uint32_t what = any(40), which = any(DR_BUTTONS);
+    if (what < 12)
+        (void)dr_panel_press(p, now, (dr_button)which);
+    else if (what < 24)
+        (void)dr_panel_release(p, now, (dr_button)which);
+    else if (what < 28)
+        (void)dr_panel_turn(p, now, (dr_knob)any(DR_KNOBS), (int16_t)((int)any(200) - 100));
+    else if (what == 28)
+        dr_panel_power(p, now, w->ins.controller.state == DR_STATE_OFF);
+}
+
+/* A host that says whatever it likes whenever it likes, mostly commands; and hands. The same for the same seed. */
 static void play(bench *w, dr_kind kind, bool is_paced, uint64_t start_us, uint64_t story, style how)
 {
     static const char *const heads[2] = {"cChwHWSxyzAR\x03", "CCKUHYNMSIFOL\x03"};
@@ -391,6 +471,7 @@ static void play(bench *w, dr_kind kind, bool is_paced, uint64_t start_us, uint6
         }
         const uint32_t pause = any(4) == 0 ? 0 : any(40000);
         const uint64_t wait = any(3) == 0 ? any(200) : any(3000000);
+        play_hands(w);
         const uint64_t kept = seed; /* how it steps must not change the story */
         (void)instrument_take(&w->ins, pause, bytes, count);
         go(w, w->ins.now_us + wait, how);
@@ -451,7 +532,11 @@ int main(void)
     RUN_TEST(a_paced_stream_fills_the_line_and_skips_what_does_not_fit);
     RUN_TEST(position_13_leaves_the_drive_out);
     RUN_TEST(stop_says_i_puts_an_i_before_the_cr);
+    RUN_TEST(stop_says_i_puts_an_i_in_the_place_of_the_cr_that_the_stop_button_causes);
+    RUN_TEST(an_i_that_was_leaving_when_the_power_went_does_not_leave);
     RUN_TEST(nul_heartbeat_beats_every_100_ms_of_an_m);
+    RUN_TEST(a_hold_acts_at_its_instant);
+    RUN_TEST(the_panel_is_that_of_the_controller_that_was_set_up);
     RUN_TEST(a_pause_within_s_is_judged_on_the_hosts_clock);
     RUN_TEST(how_finely_one_steps_changes_nothing);
     RUN_TEST(nor_does_the_wrap_of_the_32_bit_clock);
