@@ -58,7 +58,7 @@ class Failing(unittest.TestCase):
             with Guard(directory, e.path, rig(guard.MPC)) as g:
                 free = directory + "/free"
                 base = ("--port", second.path, "--config", g.config)
-                self.fails(directory, 1, ["--control", "another guard has it"], *base, "--link", free, "--control", g.socket,
+                self.fails(directory, 1, ["--control", "another program has it"], *base, "--link", free, "--control", g.socket,
                            "--log", directory + "/log2")
                 self.fails(directory, 1, ["--link", "in use"], *base, "--link", g.link, "--control", free)
                 self.fails(directory, 1, ["is no socket; it stays"], *base, "--link", free, "--control", g.config)
