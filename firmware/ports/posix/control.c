@@ -50,7 +50,7 @@ static bool is_left_over(const struct sockaddr_un *address, char *why, size_t ro
         (void)close(fd);
     if (!answers && error == ECONNREFUSED)
         return true;
-    (void)snprintf(why, room, "%s is in use: another guard has it. Stop it, or choose another path", address->sun_path);
+    (void)snprintf(why, room, "%s is in use: another program has it. Stop it, or choose another path", address->sun_path);
     return false;
 }
 
@@ -81,7 +81,7 @@ static bool make_socket(control *c, const struct sockaddr_un *address, char *why
     return false;
 }
 
-/* Two guards that start at once must not take a left-over socket from each other. Where there is no lock, goes on without. */
+/* Two programs that start at once must not take a left-over socket from each other. Where there is no lock, goes on without. */
 static int lock_directory(const char *path)
 {
     char directory[PATH_MAX];

@@ -1,7 +1,8 @@
-/* control: the second channel: a Unix socket that only its owner may use. A line of text comes in, a line of JSON goes out.
+/* control: the second channel of the guard, and of the emulator: a Unix socket that only its owner may use. A line of text
+ * comes in, a line of JSON goes out.
  *
  * Nobody is waited for: a client that does not read is dropped when too much has gathered for it.
- * Whose socket is it? One that answers belongs to a guard that runs; one that nobody answers is left over and is replaced.
+ * Whose socket is it? One that answers belongs to a program that runs; one that nobody answers is left over and is replaced.
  * Thread-safety: one thread at a time per control. */
 #ifndef CONTROL_H
 #define CONTROL_H
@@ -11,7 +12,7 @@
 #include <stddef.h>
 
 #define CONTROL_CLIENTS 8u
-#define CONTROL_LINE_MAX 128u
+#define CONTROL_LINE_MAX 512u
 #define CONTROL_FDS (CONTROL_CLIENTS + 1u)
 
 typedef struct {
@@ -27,7 +28,7 @@ typedef struct {
 typedef struct {
     const char *path; /* NULL: there is none */
     int fd;
-    bool replaced; /* a socket was left over: its guard was not ended in order */
+    bool replaced; /* a socket was left over: its program was not ended in order */
     control_client clients[CONTROL_CLIENTS];
 } control;
 
