@@ -78,9 +78,9 @@ static dr_verdict judge_setting(const dr_limits *l, const dr_command *command, u
     case DR_OP_MPC_MODE:
         return judge_value(DR_REASON_MODE_VALUE, value, l->mode_min, MODE_LAST);
     case DR_OP_MPC_SELECT:
-        return value >= 1u && value <= DR_PORTS && l->drives[value - 1u].stage != DR_STAGE_NONE
-                   ? allowed
-                   : refuse(DR_REASON_DRIVE_VALUE, DR_AXES, value, 0);
+        if (value >= 1u && value <= DR_PORTS && l->drives[value - 1u].stage != DR_STAGE_NONE)
+            return allowed;
+        return refuse(DR_REASON_DRIVE_VALUE, DR_AXES, value, 0);
     case DR_OP_MPC_STREAM_ON:
         return has(l, DR_RIG_MAY_STREAM) ? allowed : refuse(DR_REASON_STREAM, DR_AXES, 0, 0);
     default:
@@ -399,7 +399,9 @@ static dr_verdict judge_speed(const dr_limits *l, uint8_t drive, uint8_t level, 
     const dr_drive_limits *d = &l->drives[drive];
     const uint8_t cap = below ? d->slow_level : d->fast_level;
     const uint32_t speed = dr_judge_speed(l, drive, level, true), limit = dr_judge_speed(l, drive, cap, true);
-    return cap < DR_SPEED_FULL && speed > limit ? refuse(DR_REASON_SPEED, DR_AXES, speed, limit) : allowed;
+    if (cap < DR_SPEED_FULL && speed > limit)
+        return refuse(DR_REASON_SPEED, DR_AXES, speed, limit);
+    return allowed;
 }
 
 /* Does every point that the way may touch lie along the approach line? The farthest is a corner. */
