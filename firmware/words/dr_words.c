@@ -623,6 +623,173 @@ size_t dr_words_stream(char *out, size_t room, const dr_words_context *context, 
     return t.length;
 }
 
+/* -- Byte by byte ------------------------------------------------------------------------------------------------- */
+
+/* Byte `at` of a number of `width` bytes, least significant first. */
+static void add_number_byte(text *t, const dr_words_context *context, unsigned axis, const uint8_t *number,
+                            unsigned width, unsigned at)
+{
+    uint32_t value = 0;
+    for (unsigned i = width; i-- > 0;)
+        value = value << 8 | number[i];
+    add(t, "%c, byte %u of %u%s: %u", axis_letters[axis], at + 1u, width,
+        at == 0            ? " (least significant)"
+        : at + 1u == width ? " (most significant)"
+                           : "",
+        (unsigned)number[at]);
+    if (at > 0) {
+        add(t, " x ");
+        add_number(t, UINT64_C(1) << 8u * at);
+        add(t, " = ");
+        add_number(t, (uint64_t)number[at] << 8u * at);
+    }
+    if (at + 1u == width) {
+        add(t, "; together ");
+        add_axis(t, context, axis, value, true);
+    }
+}
+
+/* Where the coordinates of a frame begin, in bytes, and how wide one is. */
+static bool add_coordinate(text *t, const dr_words_context *context, const uint8_t *bytes, size_t at, size_t first,
+                           unsigned width, unsigned axis)
+{
+    if (at < first || at >= first + (size_t)width)
+        return false;
+    add_number_byte(t, context, axis, bytes + first, width, (unsigned)(at - first));
+    return true;
+}
+
+static bool add_coordinates(text *t, const dr_words_context *context, const uint8_t *bytes, size_t at, size_t first,
+                            unsigned width)
+{
+    for (unsigned axis = 0; axis < DR_AXES; axis++)
+        if (add_coordinate(t, context, bytes, at, first + (size_t)axis * width, width, axis))
+            return true;
+    return false;
+}
+
+static void add_cr(text *t, uint8_t byte)
+{
+    if (byte == DR_CR) {
+        add(t, "CR, the task-complete indicator ([T] note 1, [M] note 1)");
+    } else {
+        add_byte(t, byte);
+        add(t, " where CR is expected");
+    }
+}
+
+size_t dr_words_request_byte(char *out, size_t room, const dr_words_context *context, const uint8_t *bytes,
+                             size_t count, size_t at)
+{
+    text t = text_in(out, room);
+    dr_command command;
+    if (at >= count)
+        return 0;
+    if (!dr_command_find(context->kind, context->firmware, bytes[0], &command) || count != 1u + (size_t)command.args) {
+        add_byte(&t, bytes[at]);
+        return t.length;
+    }
+    const dr_op op = (dr_op)command.op;
+    if (at == 0) {
+        const dr_command_words *const w = dr_words_command(op);
+        add(&t, "command ");
+        if (bytes[0] >= 0x20)
+            add(&t, "'%c'", (int)bytes[0]);
+        else
+            add(&t, "^%c", (int)bytes[0] + '@');
+        add(&t, ", %s: %s (%s)", w->name, w->meaning, w->source);
+        return t.length;
+    }
+    switch ((dr_args)command.args) {
+    case DR_ARGS_NONE:
+        break;
+    case DR_ARGS_BYTE:
+        add(&t, "%s", op == DR_OP_TRIO_ANGLE ? "sets the angle" : op == DR_OP_MPC_SELECT ? "asks for" : "the mode:");
+        add_value(&t, op, bytes[at]);
+        break;
+    case DR_ARGS_AXIS:
+        (void)add_coordinate(&t, context, bytes, at, 1, 4, dr_wire_axis(op));
+        break;
+    case DR_ARGS_POINT:
+        (void)add_coordinates(&t, context, bytes, at, 1, 4);
+        break;
+    case DR_ARGS_LINE:
+        if (at == 1) {
+            add(&t, "moves");
+            add_level(&t, context, bytes[at]);
+            add(&t, context->kind == DR_TRIO ? " ([T] table 7)" : " ([M] table 10); 30 ms of pause belong behind it");
+        } else {
+            (void)add_coordinates(&t, context, bytes, at, 2, 4);
+        }
+        break;
+    }
+    return t.length;
+}
+
+size_t dr_words_reply_byte(char *out, size_t room, const dr_words_context *context, dr_op op, const uint8_t *bytes,
+                           size_t count, size_t at)
+{
+    text t = text_in(out, room);
+    dr_command command;
+    if (at >= count)
+        return 0;
+    if (!dr_command_for(context->kind, context->firmware, op, &command) || count != command.reply) {
+        add_byte(&t, bytes[at]);
+        return t.length;
+    }
+    if (at + 1u == count) {
+        add_cr(&t, bytes[at]);
+        return t.length;
+    }
+    switch (op) {
+    case DR_OP_TRIO_POSITION:
+        if (!add_coordinates(&t, context, bytes, at, 0, 4))
+            add(&t, "the angle: %u degrees", (unsigned)bytes[at]);
+        break;
+    case DR_OP_MPC_POSITION:
+        if (!add_coordinates(&t, context, bytes, at, 1, 4))
+            add(&t, "the active drive: %u", (unsigned)bytes[at]);
+        break;
+    case DR_OP_MPC_COUNT:
+    case DR_OP_MPC_DRIVES:
+        if (at == 0)
+            add(&t, "how many drives are connected: %u", (unsigned)bytes[at]);
+        else
+            add(&t, "port %u: %s", (unsigned)at, bytes[at] == 0 ? "empty" : "connected");
+        break;
+    case DR_OP_MPC_ACTIVE:
+        if (at == 0)
+            add(&t, "the active drive: %u", (unsigned)bytes[at]);
+        else
+            add(&t, "the firmware's %s version, binary-coded decimal: %x", at == 1 ? "minor" : "major",
+                (unsigned)bytes[at]);
+        break;
+    case DR_OP_MPC_SELECT:
+        if (bytes[at] == DR_NO_SUCH_DRIVE)
+            add(&t, "'E': no such drive is connected");
+        else
+            add(&t, "the drive that is active now: %u", (unsigned)bytes[at]);
+        break;
+    default:
+        add_byte(&t, bytes[at]);
+        break;
+    }
+    return t.length;
+}
+
+size_t dr_words_stream_byte(char *out, size_t room, const dr_words_context *context, const uint8_t *bytes, size_t count,
+                            size_t at)
+{
+    text t = text_in(out, room);
+    if (at >= count)
+        return 0;
+    if (count == DR_STREAM_FRAME && at < 3 && bytes[at] == 0xFF)
+        add(&t, "signature of a streamed position, byte %u of 3 ([M] note 16)", (unsigned)at + 1u);
+    else if (count != DR_STREAM_FRAME || !add_coordinates(&t, context, bytes, at, 3, 3))
+        add_byte(&t, bytes[at]);
+    return t.length;
+}
+
 /* -- Notes --------------------------------------------------------------------------------------------------------- */
 
 const char *dr_words_note_name(dr_note_kind kind)

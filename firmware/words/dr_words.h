@@ -116,6 +116,15 @@ size_t dr_words_reply(char *out, size_t room, const dr_words_context *context, d
 /* What a streamed frame says [M note 16]. */
 size_t dr_words_stream(char *out, size_t room, const dr_words_context *context, const uint8_t *bytes, size_t count);
 
+/* Byte by byte, for learners: what byte `at` of a whole frame is, and what its field comes to where the byte ends one:
+ * "X, byte 2 of 4: 0x3E x 256"; "X, byte 4 of 4: X = 16,000 steps = 1,000.0 um". */
+size_t dr_words_request_byte(char *out, size_t room, const dr_words_context *context, const uint8_t *bytes,
+                             size_t count, size_t at);
+size_t dr_words_reply_byte(char *out, size_t room, const dr_words_context *context, dr_op op, const uint8_t *bytes,
+                           size_t count, size_t at);
+size_t dr_words_stream_byte(char *out, size_t room, const dr_words_context *context, const uint8_t *bytes, size_t count,
+                            size_t at);
+
 /* -- Notes --------------------------------------------------------------------------------------------------------- */
 
 /* One word for the kind of a note: "request", "arrived". Never NULL. */

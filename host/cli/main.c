@@ -2,6 +2,7 @@
  * (print.c). */
 #define _GNU_SOURCE /* sigaction */
 
+#include "decode.h"
 #include "options.h"
 #include "print.h"
 
@@ -142,6 +143,7 @@ static int carry_out(const command_line *line, dryrig *d, const target *to, int 
         return dryrig_set_mode(d, value);
     case CMD_INFO:
     case CMD_PORTS:
+    case CMD_DECODE:
         break; /* not here */
     }
     return DRYRIG_ERR_ARGUMENT;
@@ -162,6 +164,8 @@ int main(int argc, char **argv)
     const command_id id = line.command->id;
     if (id == CMD_PORTS)
         return print_ports(&line);
+    if (id == CMD_DECODE)
+        return decode(&line);
     target to;
     memset(&to, 0, sizeof to);
     int value = 0;

@@ -42,6 +42,11 @@ static const command_row commands[] = {
      "For motions that another program began and no longer waits for: the port is one program's at a time.\n"},
     {CMD_MODE, "mode", "N", 1, false, false, "MPC-200: set the mode of the ROE, 0 (coarsest) to 9 (finest)", ""},
     {CMD_PORTS, "ports", "", 0, false, false, "list the serial ports of this machine", ""},
+    {CMD_DECODE, "decode", "BYTES|FILE", 1, false, false, "explain bytes, one by one, without a controller",
+     "BYTES is hexadecimal text, as one argument: the host's bytes; behind '<' the controller's, behind '>' the host's "
+     "again:\n"
+     "'43 < 01 80 3E 00 00 00 00 00 00 00 7D 00 00 0D'. They need --controller, and microns --stage.\n"
+     "FILE is a recording, as dryrig-emu --record writes it (./beef where the name looks like bytes).\n"},
 };
 
 #define COMMANDS (sizeof commands / sizeof commands[0])
@@ -283,14 +288,34 @@ static void set_stages(const raw_options *raw, command_line *line)
     }
 }
 
+static void set_controller(const raw_options *raw, command_line *line)
+{
+    if (strcasecmp(raw->controller, "trio") != 0 && strcasecmp(raw->controller, "mpc") != 0)
+        usage_error(line->command, "--controller must be trio or mpc, and is '%s'", raw->controller);
+    line->open = dryrig_defaults(strcasecmp(raw->controller, "trio") == 0 ? DRYRIG_TRIO : DRYRIG_MPC);
+    line->has_controller = true;
+}
+
+/* Nothing is opened: a recording says itself what the controller was. */
+static void set_decode_options(const raw_options *raw, command_line *line)
+{
+    if (raw->controller == NULL) {
+        if (raw->stage_count > 0 || raw->firmware != NULL)
+            usage_error(line->command, "--stage and --firmware need --controller");
+        return;
+    }
+    set_controller(raw, line);
+    if (raw->firmware != NULL)
+        line->open.firmware = read_firmware(raw->firmware);
+    set_stages(raw, line);
+}
+
 static void set_options(const raw_options *raw, command_line *line)
 {
     const command_row *command = line->command;
     if (raw->controller == NULL)
         usage_error(command, "--controller is missing: trio or mpc");
-    if (strcasecmp(raw->controller, "trio") != 0 && strcasecmp(raw->controller, "mpc") != 0)
-        usage_error(command, "--controller must be trio or mpc, and is '%s'", raw->controller);
-    line->open = dryrig_defaults(strcasecmp(raw->controller, "trio") == 0 ? DRYRIG_TRIO : DRYRIG_MPC);
+    set_controller(raw, line);
     line->open.port = raw->port != NULL ? raw->port : getenv("DRYRIG_PORT");
     if (line->open.port == NULL)
         usage_error(command, "--port is missing, and DRYRIG_PORT is not set; 'dryrig ports' lists the serial ports");
@@ -330,7 +355,9 @@ command_line read_command_line(int argc, char **argv)
             help_on_all();
         exit(EXIT_DONE);
     }
-    if (line.command->id != CMD_PORTS)
+    if (line.command->id == CMD_DECODE)
+        set_decode_options(&raw, &line);
+    else if (line.command->id != CMD_PORTS)
         set_options(&raw, &line);
     return line;
 }

@@ -17,7 +17,8 @@ typedef enum {
     CMD_SELECT,
     CMD_STOP,
     CMD_MODE,
-    CMD_PORTS
+    CMD_PORTS,
+    CMD_DECODE
 } command_id;
 
 typedef struct {
@@ -35,7 +36,7 @@ typedef struct {
     dryrig_options open;
     const command_row *command;
     const char *argument[3];
-    bool has_stage;
+    bool has_stage, has_controller;
     bool steps, json, stream;
     int speed;
     dryrig_order order;
