@@ -121,7 +121,8 @@ void dr_emulator_step(void)
 void dr_emulator_begin(void)
 {
     const uint8_t straps = dr_port_begin();
-    const bool is_trio = (EMULATOR_KIND == DR_TRIO) != ((straps & DR_STRAP_OTHER) != 0);
+    const dr_kind built_for = EMULATOR_KIND;
+    const bool is_trio = (built_for == DR_TRIO) != ((straps & DR_STRAP_OTHER) != 0);
     const uint8_t set = (uint8_t)((straps & DR_STRAP_STAGES) >> DR_STRAP_STAGES_SHIFT);
     const uint8_t *stages = is_trio ? trio_stages[set] : mpc_stages[set];
     const uint32_t baud = is_trio ? DR_BAUD_TRIO : DR_BAUD_MPC;

@@ -179,6 +179,7 @@ static void run(avr_cycle_count_t cycles) { run_until(avr->cycle + cycles); }
 
 /* -- USB: what a computer does ------------------------------------------------------------------------------------- */
 
+/* NOLINTNEXTLINE(readability-non-const-parameter): a packet is read or written there */
 static int transfer(uint32_t what, uint8_t endpoint, uint8_t *bytes, uint32_t *count)
 {
     for (int i = 0; i < 400 && !ended; i++) {
@@ -373,7 +374,8 @@ static void play(FILE *script)
 
 /* -- Start and end ------------------------------------------------------------------------------------------------- */
 
-static void quiet(avr_t *of, const int level, const char *format, va_list arguments)
+__attribute__((format(printf, 3, 0))) static void quiet(avr_t *of, const int level, const char *format,
+                                                        va_list arguments)
 {
     (void)of;
     if (level <= LOG_ERROR)

@@ -15,9 +15,9 @@
 
 static dr_us now;
 static uint8_t straps;
-static uint32_t baud;
+static uint32_t line_baud;
 static bool has_pace;
-static size_t room;
+static size_t line_room;
 
 static struct {
     dr_us when;
@@ -35,7 +35,7 @@ static uint16_t worn_slots; /* bits: what is written there does not stay */
 static uint32_t waits;
 
 uint8_t dr_port_begin(void) { return straps; }
-void dr_port_open(uint32_t rate) { baud = rate; }
+void dr_port_open(uint32_t baud) { line_baud = baud; }
 dr_us dr_port_now_us(void) { return now; }
 
 static dr_us end_of_test;
@@ -56,19 +56,19 @@ void dr_port_wait(bool has_end, dr_us until)
         now++; /* a step takes its time */
 }
 
-size_t dr_port_read(uint8_t *bytes, size_t most)
+size_t dr_port_read(uint8_t *bytes, size_t room)
 {
     size_t count = 0;
-    while (count < most && input_at < input_count && !dr_us_before(now, input[input_at].when))
+    while (count < room && input_at < input_count && !dr_us_before(now, input[input_at].when))
         bytes[count++] = input[input_at++].byte;
     return count;
 }
 
-size_t dr_port_room(void) { return room; }
+size_t dr_port_room(void) { return line_room; }
 
 void dr_port_write(const uint8_t *bytes, size_t count)
 {
-    TEST_ASSERT_LESS_OR_EQUAL(room, count);
+    TEST_ASSERT_LESS_OR_EQUAL(line_room, count);
     for (size_t i = 0; i < count && output_count < HEARD_MAX; i++) {
         output[output_count].when = now;
         output[output_count++].byte = bytes[i];
@@ -144,7 +144,7 @@ void setUp(void)
     now = 12345;
     straps = 0;
     has_pace = false;
-    room = 14;
+    line_room = 14;
     slots = SLOTS;
     writes_left = UINT32_MAX;
     writes = 0;
@@ -165,7 +165,7 @@ static const uint8_t to_0[13] = {'H'};
 static void a_trio_calibrates_at_power_on_and_then_answers(void)
 {
     switch_on();
-    TEST_ASSERT_EQUAL_UINT32(57600, baud);
+    TEST_ASSERT_EQUAL_UINT32(57600, line_baud);
     /* Home order to the beginning, 1 mm an axis at 5 mm/s one after the other, then out on all axes together. */
     ask("c", 1, 790000);
     TEST_ASSERT_EQUAL(0, output_count);
@@ -178,7 +178,7 @@ static void straps_choose_the_controller_and_its_stages(void)
     static const uint8_t two[6] = {2, 1, 1, 0, 0, 13}, four[6] = {4, 1, 1, 1, 1, 13};
     straps = DR_STRAP_OTHER;
     switch_on();
-    TEST_ASSERT_EQUAL_UINT32(128000, baud);
+    TEST_ASSERT_EQUAL_UINT32(128000, line_baud);
     ask("U", 1, 10000);
     heard(two, 6);
     straps = DR_STRAP_OTHER | DR_STRAP_STAGES;
@@ -224,13 +224,13 @@ static void a_line_with_a_pace_gets_what_it_has_room_for(void)
     has_pace = true;
     switch_on();
     run_us(DR_US_PER_S);
-    room = 3;
+    line_room = 3;
     ask("c", 1, 1000);
     heard(trio_at_1000_um, 14);
-    room = 0;
+    line_room = 0;
     ask("c", 1, 1000);
     TEST_ASSERT_EQUAL(0, output_count);
-    room = 14;
+    line_room = 14;
     run_us(1000);
     heard(trio_at_1000_um, 14);
 }

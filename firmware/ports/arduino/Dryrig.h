@@ -16,7 +16,7 @@
 
 class DryrigEmulator
 {
-public:
+  public:
     /* On a line that is open already. `straps`: DR_STRAP_STAGES and DR_STRAP_KEEP of port.h. */
     void begin(Stream &line, dr_kind kind, uint8_t straps = 0);
     void step() { dr_emulator_step(); }
