@@ -140,10 +140,9 @@ static const uint8_t *get_struct(const uint8_t *image, const field *fields, size
     return image;
 }
 
-static uint32_t put_all(const dr_limits *limits, uint8_t *image)
+static uint32_t put_all(const dr_limits *limits, sink to)
 {
     static const dr_obstacle none = {0, 0, 0, {{0, 0, 0}, {0, 0, 0}}, {0, {0, 0, 0}}};
-    sink to = {image, 0, 0};
     for (size_t i = 0; i < sizeof image_head; i++)
         put_byte(&to, image_head[i]);
     put_struct(&to, head_fields, FIELDS(head_fields), limits);
@@ -157,12 +156,12 @@ static uint32_t put_all(const dr_limits *limits, uint8_t *image)
 
 void dr_limits_put(const dr_limits *limits, uint8_t *image)
 {
-    const uint32_t crc = put_all(limits, image);
+    const uint32_t crc = put_all(limits, (sink){image, 0, 0});
     for (uint8_t i = 0; i < CRC_BYTES; i++)
         image[CRC_AT + i] = (uint8_t)(crc >> (8u * i));
 }
 
-uint32_t dr_limits_crc(const dr_limits *limits) { return put_all(limits, NULL); }
+uint32_t dr_limits_crc(const dr_limits *limits) { return put_all(limits, (sink){NULL, 0, 0}); }
 
 static bool has_problem(dr_limits_problem *problem, dr_limits_error error, uint8_t item, uint8_t axis)
 {

@@ -11,7 +11,7 @@ static int64_t next(char **at)
     char *end;
     const int64_t value = strtoll(*at, &end, 10);
     if (end == *at) {
-        fprintf(stderr, "judge_driver: a number is missing before: %s\n", *at);
+        (void)fprintf(stderr, "judge_driver: a number is missing before: %s\n", *at);
         exit(2);
     }
     *at = end;

@@ -79,6 +79,18 @@ static void row_70_every_flipped_bit_and_every_truncation_is_rejected(void)
     TEST_ASSERT_EQUAL(DR_LIMITS_MAGIC, problem.error);
 }
 
+static void another_version_is_told_from_damage(void)
+{
+    dr_limits_put(&good, image);
+    image[4] = DR_LIMITS_VERSION_NOW + 1;
+    TEST_ASSERT_FALSE(dr_limits_get(image, DR_LIMITS_IMAGE_BYTES, &read, &problem));
+    TEST_ASSERT_EQUAL(DR_LIMITS_VERSION, problem.error);
+    image[4] = DR_LIMITS_VERSION_NOW;
+    image[0] = 'd';
+    TEST_ASSERT_FALSE(dr_limits_get(image, DR_LIMITS_IMAGE_BYTES, &read, &problem));
+    TEST_ASSERT_EQUAL(DR_LIMITS_MAGIC, problem.error);
+}
+
 static void a_good_crc_does_not_make_nonsense_good(void)
 {
     good.drives[0].box_q.min_q[DR_Y] = good.drives[0].box_q.max_q[DR_Y];
@@ -126,6 +138,72 @@ static void row_71_nonsense_in_the_head(void)
     good.knob_q_per_s = 0, good.rig = DR_RIG_KNOBS_LOCKED, expect(DR_LIMITS_GOOD, 0, DR_AXES);
     good.knob_q_per_s = UM(20000) + 1, expect(DR_LIMITS_KNOB, 0, DR_AXES);
     good.beyond_zero_q = -1, expect(DR_LIMITS_BEYOND_ZERO, 0, DR_AXES);
+}
+
+static void the_last_good_values(void)
+{
+#define GOOD(change) (change, expect(DR_LIMITS_GOOD, 0, DR_AXES))
+    GOOD(good.firmware = 0x0321);
+    GOOD(good.firmware = 0x9999);
+    GOOD(good.refusal = DR_REFUSE_E);
+    GOOD(good.host_loss = DR_HOST_LOSS_FINISH);
+    GOOD(good.angle_min_deg = 1);
+    GOOD(good.angle_min_deg = 80);
+    GOOD(good.mode_min = 9);
+    GOOD(good.unstoppable_ms = 60000);
+    GOOD(good.unstoppable_ms = 0);
+    GOOD(good.arm_idle_s = 1);
+    GOOD(good.arm_idle_s = 2000);
+    GOOD(good.margin_q = 0);
+    GOOD(good.knob_q_per_s = 1);
+    GOOD(good.knob_q_per_s = UM(20000));
+    GOOD(good.beyond_zero_q = 0);
+    GOOD(good.beyond_zero_q = UM(10000));
+    GOOD(good.drives[0].box_q.min_q[DR_X] = 0);
+    GOOD(good.drives[0].box_q.min_q[DR_X] = good.drives[0].box_q.max_q[DR_X] - 1);
+    GOOD(good.drives[0].max_move_q = 1);
+    GOOD(good.drives[0].max_move_q = (uint32_t)DR_FAR_Q);
+    GOOD(good.drives[0].fast_level = good.drives[0].slow_level = 0);
+    GOOD(good.drives[2].approach[DR_Y] = DR_NORMAL_MAX);
+    GOOD(good.drives[2].approach[DR_Y] = -DR_NORMAL_MAX);
+    GOOD(good.obstacles[0].exit = DR_TO_MORE_Z);
+    GOOD(good.obstacles[0].box_q.min_q[DR_X] = -DR_FAR_Q);
+    GOOD(good.obstacles[0].box_q.max_q[DR_X] = DR_FAR_Q);
+    GOOD(good.obstacles[0].box_q.min_q[DR_X] = good.obstacles[0].box_q.max_q[DR_X]);
+    GOOD(good.obstacles[1].half_q.offset_q = -UM(500) - UM(300) - UM(50)); /* where a reading may still be */
+    GOOD((good.drives[2].surface_q = 0, good.drives[2].clearance_q = 0));
+    GOOD((good.margin_q = UM(10000), good.obstacle_count = 0));
+    memset(&good.obstacles[2], 0, sizeof good.obstacles[2]);
+    for (good.obstacle_count = 2; good.obstacle_count < DR_OBSTACLES_MAX; good.obstacle_count++)
+        good.obstacles[good.obstacle_count] = good.obstacles[0];
+    expect(DR_LIMITS_GOOD, 0, DR_AXES);
+    good.beyond_zero_q = UM(10000) + 1, expect(DR_LIMITS_BEYOND_ZERO, 0, DR_AXES);
+    good.obstacles[1].half_q.offset_q = -UM(850) - 1, expect(DR_LIMITS_OBSTACLE_OUTSIDE, 1, DR_AXES);
+    good.drives[2].retract = DR_TO_LESS_Z, good.drives[2].clearance_q = (uint32_t)UM(7900) - 1;
+    expect(DR_LIMITS_GOOD, 0, DR_AXES);
+}
+
+static void defaults_are_careful(void)
+{
+    dr_limits trio;
+    dr_limits_init(&trio, DR_TRIO);
+    TEST_ASSERT_EQUAL(DR_FIRMWARE_TRIO, trio.firmware);
+    TEST_ASSERT_EQUAL(10, trio.angle_min_deg);
+    TEST_ASSERT_EQUAL(80, trio.angle_max_deg);
+    TEST_ASSERT_EQUAL(200, trio.unstoppable_ms);
+    TEST_ASSERT_EQUAL(900, trio.arm_idle_s);
+    TEST_ASSERT_EQUAL(UM(50), trio.margin_q);
+    TEST_ASSERT_EQUAL(UM(5000), trio.knob_q_per_s);
+    TEST_ASSERT_EQUAL(UM(300), trio.beyond_zero_q);
+    TEST_ASSERT_EQUAL(0, trio.rig);
+    TEST_ASSERT_TRUE(dr_limits_init_drive(&trio, 0, DR_STAGE_TRIO_MP865));
+    TEST_ASSERT_EQUAL(UM(100), trio.drives[0].box_q.min_q[DR_Y]);
+    TEST_ASSERT_EQUAL(533333 * 6 - UM(100), trio.drives[0].box_q.max_q[DR_X]);
+    TEST_ASSERT_EQUAL(133333 * 6 - UM(100), trio.drives[0].box_q.max_q[DR_Y]);
+    TEST_ASSERT_EQUAL(UM(5000), trio.drives[0].max_move_q);
+    TEST_ASSERT_EQUAL(DR_SPEED_FULL, trio.drives[0].fast_level);
+    TEST_ASSERT_EQUAL(DR_SPEED_FULL, trio.drives[0].slow_level);
+    TEST_ASSERT_EQUAL(DR_FIRMWARE_MPC, good.firmware);
 }
 
 static void row_71_nonsense_in_a_drive(void)
@@ -203,6 +281,9 @@ int main(void)
     RUN_TEST(row_70_every_flipped_bit_and_every_truncation_is_rejected);
     RUN_TEST(a_good_crc_does_not_make_nonsense_good);
     RUN_TEST(row_71_nonsense_in_the_head);
+    RUN_TEST(another_version_is_told_from_damage);
+    RUN_TEST(the_last_good_values);
+    RUN_TEST(defaults_are_careful);
     RUN_TEST(row_71_nonsense_in_a_drive);
     RUN_TEST(a_trio_has_one_drive_and_switches);
     RUN_TEST(row_71_nonsense_in_an_obstacle);

@@ -98,8 +98,12 @@ static void row_63_a_changed_tip_disarms_until_it_is_confirmed(void)
     run_ms(150);
     expect_state(DR_GUARD_DISARMED);
     TEST_ASSERT_EQUAL(DR_NEEDS_TIP, status().needs);
-    press(DR_INPUT_CONFIRM);
+    input(DR_INPUT_CONFIRM, true);
     TEST_ASSERT_EQUAL(0, status().needs);
+    press(DR_INPUT_TIP_CHANGED);
+    input(DR_INPUT_CONFIRM, false); /* letting go confirms nothing */
+    TEST_ASSERT_EQUAL(DR_NEEDS_TIP, status().needs);
+    press(DR_INPUT_CONFIRM);
     press(DR_INPUT_ARM);
     run_ms(150);
     expect_state(DR_GUARD_IDLE);
@@ -536,6 +540,8 @@ static void without_valid_limits_only_ctrl_c_passes(void)
         TEST_ASSERT_EQUAL(1, rig.wire_count);
         TEST_ASSERT_EQUAL(3, rig.wire[0]);
         expect_silence();
+        TEST_ASSERT_EQUAL(1, status().quarantined_bytes); /* the answer to ^C */
+        TEST_ASSERT_EQUAL(6, status().dropped_bytes);
         TEST_ASSERT_FALSE(dr_guard_self_check(&rig.guard, guard_clock()));
     }
 }
