@@ -50,7 +50,8 @@ static bool is_left_over(const struct sockaddr_un *address, char *why, size_t ro
         (void)close(fd);
     if (!answers && error == ECONNREFUSED)
         return true;
-    (void)snprintf(why, room, "%s is in use: another program has it. Stop it, or choose another path", address->sun_path);
+    (void)snprintf(why, room, "%s is in use: another program has it. Stop it, or choose another path",
+                   address->sun_path);
     return false;
 }
 

@@ -173,9 +173,12 @@ const char *guard_words_reason(uint8_t reason) { return reason < DR_REASONS ? re
 
 size_t guard_words_um(char *out, size_t room, int64_t quanta)
 {
-    char text[32];
-    (void)dr_words_um(text, sizeof text, quanta < 0 ? (uint64_t)-quanta : (uint64_t)quanta);
-    return (size_t)snprintf(out, room, "%s%s", quanta < 0 ? "-" : "", text);
+    const bool has_room = room > 1 && quanta < 0;
+    if (quanta >= 0)
+        return dr_words_um(out, room, (uint64_t)quanta);
+    if (has_room)
+        *out = '-';
+    return 1 + dr_words_um(has_room ? out + 1 : NULL, has_room ? room - 1 : 0, (uint64_t)-quanta);
 }
 
 static void value(char *out, size_t room, uint8_t of, int64_t number)

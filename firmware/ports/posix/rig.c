@@ -681,7 +681,13 @@ static void tell_problem(reader *r, const config_setting_t *root, dr_limits_prob
                                             : NULL;
     if (row != NULL && problem.error <= DR_LIMITS_BOX_OUTSIDE)
         at = config_setting_get_member(at, (const char *[]){"x", "y", "z"}[problem.axis]);
-    fail_at(r, line_of(at != NULL ? at : group), "%s%s", says, axes[problem.axis < DR_AXES ? problem.axis : DR_AXES]);
+    const unsigned line = line_of(at != NULL ? at : group);
+    dr_stage stage;
+    if (problem.error == DR_LIMITS_BOX_OUTSIDE &&
+        dr_stage_get((dr_stage_id)r->out->limits.drives[problem.item].stage, &stage))
+        fail_at(r, line, "%s%s: 0 to %.10g um", says, axes[problem.axis],
+                (double)stage.travel_steps[problem.axis] * stage.quanta_per_step / DR_QUANTA_PER_UM);
+    fail_at(r, line, "%s%s", says, axes[problem.axis < DR_AXES ? problem.axis : DR_AXES]);
 }
 
 uint32_t rig_count_free(const dr_limits *l, uint8_t drive, uint32_t one[DR_AXES])
