@@ -258,7 +258,8 @@ static int judge(dryrig *d, const plan *p, const watch *w, const dryrig_position
     if (w->stops > 0) {
         __atomic_store_n(&d->interrupted, 0, __ATOMIC_SEQ_CST);
         return fail(d, DRYRIG_ERR_INTERRUPTED, "interrupted; the stage stands at %s%s", place_of(end).text,
-                    p->row.op == DR_OP_MPC_CALIBRATE ? ", uncalibrated until a power cycle and a whole calibration" : "");
+                    p->row.op == DR_OP_MPC_CALIBRATE ? ", uncalibrated until a power cycle and a whole calibration"
+                                                     : "");
     }
     if (w->by_hand)
         return fail(d, DRYRIG_ERR_STOPPED, "STOP was pressed on the ROE; the stage stands at %s", place_of(end).text);
