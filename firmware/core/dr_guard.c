@@ -49,8 +49,10 @@ typedef enum {
 #define STALE_US MS(20000) /* the longest travel, by knob */
 #define JUMP_Q (20 * (int32_t)DR_QUANTA_PER_UM)
 #define READY_US MS(1000) /* "ready about one second after power-on" [O] */
+/* A TRIO may be calibrating by itself: a minute, in pauses that grow by a second. Ten queries and the ^C after a reset are
+ * fewer than the 12 bytes that a controller waits for if the guard before died within an 'S': whole, it would move. */
 #define PROVE_RETRY_US MS(1000)
-#define PROVE_ATTEMPTS 60u /* a TRIO may be calibrating by itself */
+#define PROVE_ATTEMPTS 10u
 #define RATE_TOKENS 20u
 #define RATE_US MS(50)
 #define NOISE_US MS(1000)
@@ -59,7 +61,7 @@ typedef enum {
 #define RELEASE_US MS(20)
 #define RAW_STOPS_MAX 15u /* ^C that wait to leave */
 #define CTRL_C 0x03u
-#define EVENTS_MAX 32u /* at most so many in one call; a caller who comes that late is due again at once */
+#define EVENTS_MAX 16u /* at most so many in one call; a caller who comes that late is due again at once */
 
 /* -- Small helpers ------------------------------------------------------------------------------------------------- */
 
@@ -184,7 +186,7 @@ static void show_state(dr_guard *g, dr_us now)
 static void put_host(dr_guard *g, uint8_t byte)
 {
     if (g->to_host_count < DR_HOST_OUT_MAX)
-        g->to_host[(g->to_host_first + g->to_host_count++) % DR_HOST_OUT_MAX] = byte;
+        g->to_host[((unsigned)g->to_host_first + g->to_host_count++) % DR_HOST_OUT_MAX] = byte;
 }
 
 static void flush_dropped(dr_guard *g, dr_us now)
@@ -480,8 +482,8 @@ static bool looks_like_mpc(const dr_guard *g)
     dr_command query;
     dr_reply reply;
     (void)dr_command_for(DR_MPC, DR_FIRMWARE_MPC, DR_OP_MPC_POSITION, &query);
-    return dr_wire_get_reply(&query, g->read, DR_REPLY_MAX, &reply) && reply.steps[DR_X] < (1u << 24) &&
-           reply.steps[DR_Y] < (1u << 24) && reply.steps[DR_Z] < (1u << 24);
+    return dr_wire_get_reply(&query, g->read, DR_REPLY_MAX, &reply) && reply.steps[DR_X] < (UINT32_C(1) << 24) &&
+           reply.steps[DR_Y] < (UINT32_C(1) << 24) && reply.steps[DR_Z] < (UINT32_C(1) << 24);
 }
 
 static void know_place(dr_guard *g, dr_us now, const dr_reply *reply)
@@ -528,7 +530,7 @@ static bool has_two(dr_guard *g, dr_us now, const dr_reply *reply, bool *agree)
     return true;
 }
 
-static void proved(dr_guard *g)
+static void identity_proved(dr_guard *g)
 {
     g->proved = true;
     g->ambiguous = false;
@@ -543,7 +545,7 @@ static void read_for_proof(dr_guard *g, dr_us now, const dr_reply *reply)
     if (kind_of(g) == DR_TRIO && looks_like_mpc(g))
         g->ambiguous = true;
     else
-        proved(g);
+        identity_proved(g);
 }
 
 static void read_for_arming(dr_guard *g, dr_us now, const dr_reply *reply)
@@ -762,7 +764,7 @@ static void give_up_reading(dr_guard *g, dr_us now, dr_fault fault)
         stop_reading(g);
         g->fault = (uint8_t)(fault == DR_FAULT_IMPLAUSIBLE ? DR_FAULT_IDENTITY : fault);
         if (--g->attempts > 0)
-            set_timer(g, DR_TIMER_TASK, now + PROVE_RETRY_US);
+            set_timer(g, DR_TIMER_TASK, now + (PROVE_ATTEMPTS - g->attempts) * PROVE_RETRY_US);
         else
             end_task(g);
         return;
@@ -1374,7 +1376,7 @@ static void confirm_pressed(dr_guard *g, dr_us now)
     g->tip_changed = false;
     g->confirmed = true;
     if (g->ambiguous)
-        proved(g);
+        identity_proved(g);
     if (g->cut && g->mode == MODE_DISARMED) { /* somebody has made room for the calibration at power-on */
         g->cut = false;
         lock(g, DR_FAULT_NONE);

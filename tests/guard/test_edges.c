@@ -686,7 +686,7 @@ static void a_caller_who_comes_late_is_due_again_at_once(void)
     rig.to_device_busy = true; /* nobody pulls */
     rig.to_device_at = UINT64_MAX;
     bench_start();
-    rig.now += 1500000000; /* 25 minutes of a proof that gets no answer: over a hundred events */
+    rig.now += 1500000000; /* 25 minutes of a proof that gets no answer: more events than one call settles */
     TEST_ASSERT_EQUAL(0, dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 0));
     TEST_ASSERT_TRUE(dr_guard_due(&rig.guard, &when));
     TEST_ASSERT_TRUE(dr_us_before(when, guard_clock()));

@@ -219,7 +219,7 @@ size_t guard_words_verdict(char *out, size_t room, const rig *r, const dr_verdic
     const char *const item = item_name(r, v->item);
     if (item != NULL)
         return (size_t)snprintf(out, room, "%s: %s", says, item);
-    if (v->axis < DR_AXES)
+    if (v->axis < DR_AXES && v->reason != DR_REASON_HIDDEN) /* that is about the place, not about an axis */
         return (size_t)snprintf(out, room, "%c: %s", axes[v->axis], says);
     return (size_t)snprintf(out, room, "%s", says);
 }
