@@ -7,6 +7,7 @@
  */
 #define _GNU_SOURCE /* signalfd, mkdtemp */
 #include "child.h"  /* the command of `run` */
+#include "desk.h"   /* what it is told while it runs */
 #include "engine.h" /* the loop */
 #include "lint.h"   /* which rules the host breaks */
 #include "lint_report.h"
@@ -34,6 +35,7 @@ typedef struct {
     engine e;
     trace trace;
     observer_link *trace_links;
+    desk desk;
     lint lint;
     observer_link *lint_links;
     FILE *lint_json, *lint_junit;
@@ -199,7 +201,9 @@ static bool prepare_run(program *p)
     for (unsigned i = 0; i < p->e.station_count; i++)
         if (p->e.stations[i].link == NULL && (p->e.stations[i].link = in_directory(p, p->e.stations[i].name)) == NULL)
             return false;
-    return true;
+    if (p->o->control == NULL)
+        p->o->control = in_directory(p, "control");
+    return p->o->control != NULL;
 }
 
 static void set_environment(const program *p)
@@ -210,6 +214,7 @@ static void set_environment(const program *p)
         (void)snprintf(variable, sizeof variable, "DRYRIG_PORT_%s", s->name);
         (void)setenv(p->o->rig_file == NULL ? "DRYRIG_PORT" : variable, s->link, 1);
     }
+    (void)setenv("DRYRIG_CONTROL", p->o->control, 1);
 }
 
 /* -- From beginning to end ----------------------------------------------------------------------------------------------- */
@@ -302,16 +307,42 @@ static void report_lint(program *p)
     lint_close(&p->lint);
 }
 
+/* What stands in the rig file, then --do. */
+static bool do_first(program *p)
+{
+    const rig *const r = &p->o->rig;
+    char line[LANGUAGE_LINE];
+    for (unsigned i = 0; i < r->count; i++)
+        for (unsigned n = 0; n < r->members[i].do_count; n++) {
+            (void)snprintf(line, sizeof line, "@%s %s", r->members[i].name, r->members[i].do_[n]);
+            if (!desk_do(&p->desk, line))
+                return false;
+        }
+    for (unsigned i = 0; i < p->o->do_count; i++)
+        if (!desk_do(&p->desk, p->o->dos[i]))
+            return false;
+    return true;
+}
+
 /* The ports are open, the links are made. */
 static void start_and_run(program *p)
 {
+    char why[PATH_ROOM + 256];
     p->status = 1;
     if (!open_trace(p) || !open_lint(p))
         return;
+    if (!desk_open(&p->desk, &p->e, p->trace.file == NULL ? NULL : &p->trace, p->o->control, why, sizeof why)) {
+        (void)fprintf(stderr, "dryrig-emu: --control: %s\n", why);
+        return;
+    }
     const bool has_command = p->o->task == TASK_RUN;
     if (!has_command)
         introduce(p);
     engine_start(&p->e);
+    if (!do_first(p)) {
+        p->status = 2;
+        return;
+    }
     if (!has_command && !say_ready(p)) {
         (void)fail("cannot write the line 'ready' to stdout");
         return;
@@ -337,6 +368,7 @@ static int run(program *p)
         return fail("run: cannot make a directory for the command's ports (TMPDIR says where)");
     if (engine_plug(&p->e, why, sizeof why)) {
         start_and_run(p);
+        desk_close(&p->desk);
         engine_close(&p->e);
         trace_close(&p->trace);
         report_lint(p);
@@ -353,6 +385,12 @@ int main(int argc, char **argv)
 {
     static program p;
     fill_standard_fds();
+    if (argc > 1 && strcmp(argv[1], "ctl") == 0) {
+        if (argc > 3)
+            return desk_ctl(argv[2], argv + 3);
+        (void)fprintf(stderr, "dryrig-emu: ctl: expected a path and a command: dryrig-emu ctl PATH help\n");
+        return 2;
+    }
     static options o;
     o = options_read(argc, argv);
     p.o = &o;

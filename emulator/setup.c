@@ -172,6 +172,11 @@ static bool read_quirks(setup *o, const char *list, setup_problem *problem)
     return true;
 }
 
+bool setup_has_quirk(const instrument *ins, dr_quirk_id id)
+{
+    return (ins->controller.quirks & dr_words_quirk(id)->core) != 0 || (ins->quirks & byte_quirk(id)) != 0;
+}
+
 bool setup_quirk(instrument *ins, const char *name, bool on, char why[WHY_ROOM])
 {
     dr_quirk_id id;

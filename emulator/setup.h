@@ -7,6 +7,8 @@
 #include "instrument.h" /* dr_controller, dr_drive */
 #include "values.h"     /* WHY_ROOM */
 
+#include "dr_words.h" /* dr_quirk_id */
+
 /* What was written. NULL: nothing was. It is understood when all of it is known: what fits depends on the controller and its
  * firmware. */
 typedef struct {
@@ -42,6 +44,7 @@ bool setup_read(const setup_text *text, bool is_paced_by_default, setup *out, se
 void setup_apply(const setup *s, instrument *ins, dr_drive *drives);
 
 /* A quirk by its name, on or off. False: why[] tells what was expected. */
+bool setup_has_quirk(const instrument *ins, dr_quirk_id id);
 bool setup_quirk(instrument *ins, const char *name, bool on, char why[WHY_ROOM]);
 
 #endif

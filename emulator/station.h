@@ -23,11 +23,12 @@ struct station {
     /* to be read by anybody */
     observer_link *observers;
     pty port;
-    bool is_plugged;  /* it has a port; false while its USB plug is out */
-    int link_lock;    /* -1: no link */
-    bool was_open;    /* see station_look() */
-    bool has_unread;  /* the kernel holds bytes that the line had no room for */
-    bool wants_write; /* waits for the host to read */
+    uint8_t unplugged[DR_PORTS]; /* dr_stage_id: what hands have last taken from each port */
+    bool is_plugged;             /* it has a port; false while its USB plug is out */
+    int link_lock;               /* -1: no link */
+    bool was_open;               /* see station_look() */
+    bool has_unread;             /* the kernel holds bytes that the line had no room for */
+    bool wants_write;            /* waits for the host to read */
     bool told_loss;
     uint64_t read_ns;   /* when the host's last bytes came */
     uint64_t now_ns;    /* real time, as the last call said */

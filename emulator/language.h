@@ -1,0 +1,71 @@
+/* language: what can be told to a running emulator, on its control channel, with --do and in rig files: a line of words, and
+ * a JSON object for an answer. dryrig-control.7 defines it.
+ *
+ * The verbs stand in tables; a new one is a row in a table, and a new table is one more in `tables` of language.c.
+ * Thread-safety: one thread. */
+#ifndef LANGUAGE_H
+#define LANGUAGE_H
+
+#include "engine.h" /* stations, clock */
+#include "setup.h"  /* WHY_ROOM, quirks */
+#include "trace.h"  /* trace on, trace off */
+
+#include <cjson/cJSON.h>
+
+#define LANGUAGE_WORDS 24u
+#define LANGUAGE_LINE 512u
+
+typedef struct language language;
+
+/* A line that is being carried out. */
+typedef struct {
+    language *l;
+    station *s;                            /* the controller it is about; NULL: none was named, and there are several */
+    const char *words[LANGUAGE_WORDS + 1]; /* NULL behind the last */
+    unsigned at;                           /* the word that is looked at */
+    cJSON *answer;
+    bool follows; /* the asker wants to be told what happens from now on */
+    char why[WHY_ROOM];
+} telling;
+
+typedef struct {
+    const char *name;              /* the first word */
+    const char *usage;             /* what follows it */
+    const char *help;              /* one line */
+    bool needs_one;                /* it is about one controller */
+    bool (*carry_out)(telling *t); /* t->at is behind the verb. False: t->why says what was expected */
+} verb;
+
+struct language {
+    engine *e;
+    trace *trace; /* NULL: none */
+    struct trigger *triggers;
+    unsigned depth; /* in a line that another line, or time, has made */
+};
+
+/* Carries out a line. {"ok":true, ...} or {"ok":false,"why":"..."}; the caller deletes it. *follows may be NULL. */
+cJSON *language_do(language *l, const char *line, bool *follows);
+/* Takes what waits for its time or its command back. */
+void language_close(language *l);
+
+/* -- For verbs ----------------------------------------------------------------------------------------------------------- */
+
+/* The next word, or NULL. */
+const char *telling_next(telling *t);
+/* Is the next word this one? Then it is taken. */
+bool telling_take(telling *t, const char *word);
+/* Nothing may follow. */
+bool telling_ends(telling *t);
+/* t->why, and false. */
+__attribute__((format(printf, 2, 3))) bool telling_wrong(telling *t, const char *format, ...);
+/* The next word as a time. */
+bool telling_time(telling *t, uint64_t *us);
+/* The next word as a command of the controller: 'S', '^C' or its name. */
+bool telling_command(telling *t, dr_op *op);
+/* Lets the rest of the line be carried out later, at an instant of the controllers' clock. */
+bool telling_later(telling *t, uint64_t when_us, const char *line, bool is_passive);
+
+/* Tables. */
+extern const verb verbs_rig[]; /* clock, power, plugs, settings; the last has no name */
+
+#endif
