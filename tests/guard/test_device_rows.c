@@ -679,6 +679,28 @@ static void row_55_a_controller_that_was_power_cycled(void)
     expect_fault(DR_FAULT_POSITION_JUMP);
 }
 
+static void row_55_a_knob_is_no_faster_than_a_knob(void)
+{
+    static const struct {
+        unsigned after_ms;
+        uint32_t steps;
+        bool jumps;
+    } turns[] = {{1000, 40000, false},  {1000, 41000, true},  {2000, 79000, false},  {2000, 81000, true},
+                 {3000, 119000, false}, {3000, 121000, true}, {21000, 159000, false}};
+    for (size_t i = 0; i < sizeof turns / sizeof *turns; i++) {
+        fake_rig();
+        rig.limits.rig = 0; /* 5 mm/s: 40 microsteps a ms */
+        rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+        host_code('c');
+        fake_ms(10);
+        fake_ms(turns[i].after_ms - 10);
+        fake.at[1] = 40000 + turns[i].steps;
+        host_code('c');
+        fake_ms(10);
+        expect_fault(turns[i].jumps ? DR_FAULT_POSITION_JUMP : DR_FAULT_NONE);
+    }
+}
+
 static void row_56_the_pause_that_the_controller_needs(void)
 {
     bench_mpc();
@@ -869,6 +891,7 @@ int main(void)
     RUN_TEST(row_54_another_firmware_locks);
     RUN_TEST(the_other_controller_is_not_taken_for_the_one_of_the_limits);
     RUN_TEST(row_55_a_controller_that_was_power_cycled);
+    RUN_TEST(row_55_a_knob_is_no_faster_than_a_knob);
     RUN_TEST(row_56_the_pause_that_the_controller_needs);
     RUN_TEST(row_57_bytes_that_nobody_asked_for);
     RUN_TEST(noise_while_it_moves_stops);

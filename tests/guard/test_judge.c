@@ -614,6 +614,11 @@ static void row_49_what_stop_broke_off_must_be_clear_too(void)
     REFUSED(DR_REASON_OLD_TARGET, judge('M', 5100, 5000, 8000));
     scene.old[0].is_open = false;
     ALLOWED(judge('M', 5100, 5000, 8000));
+    scene.drive = scene.chosen = 0; /* and the reverse, with an obstacle of drive 1 */
+    limits.obstacles[0].drive = 1;
+    scene.old[1] = (dr_old_move){
+        true, {5000 * 16, 5000 * 16, 9000 * 16}, {{UM(9000), UM(9000), UM(6000)}, {UM(9000), UM(9000), UM(6000)}}};
+    REFUSED(DR_REASON_OLD_TARGET, judge('M', 5100, 5000, 8000));
 }
 
 int main(void)

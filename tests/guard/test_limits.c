@@ -114,6 +114,9 @@ static void row_71_nonsense_in_the_head(void)
     expect(DR_LIMITS_GOOD, 0, DR_AXES);
     good.kind = 2, expect(DR_LIMITS_KIND, 0, DR_AXES);
     good.firmware = 0x032A, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
+    good.firmware = 0x03A1, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
+    good.firmware = 0x0A21, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
+    good.firmware = 0xA321, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
     good.firmware = 0x0099, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
     good.rig = DR_RIG_Y_LOCKED_OUT, expect(DR_LIMITS_RIG, 0, DR_AXES);
     good.rig = 0x0100, expect(DR_LIMITS_RIG, 0, DR_AXES);

@@ -340,6 +340,7 @@ static void row_69_disarmed_after_900_s_without_a_motion(void)
     expect_cr();
     run_ms(200);
     expect_state(DR_GUARD_DISARMED);
+    TEST_ASSERT_EQUAL(20, rig.guard.tokens);
     host_line(15, 41600, 40000, 40000);
     run_ms(100);
     expect_refused(DR_REASON_NOT_ARMED);
