@@ -11,6 +11,7 @@
  *     avr_board --program MCU IMAGE.elf
  *         Runs a program to its end (sleep without interrupts); prints what it writes to UART 0; exits with its GPIOR0.
  *
+ * --low PIN...: these pins of the chip are connected to ground; D2E4 is bit 2 of port D and bit 4 of port E.
  * --memory FILE: the EEPROM, read at the start, written at the end. At the end says on stderr how deep the stack was. */
 #define _DEFAULT_SOURCE /* openpty, cfmakeraw */
 #include <errno.h>
@@ -29,6 +30,7 @@
 #include <unistd.h>
 
 #include <simavr/avr_eeprom.h>
+#include <simavr/avr_ioport.h>
 #include <simavr/avr_uart.h>
 #include <simavr/avr_usb.h>
 #include <simavr/sim_avr.h>
@@ -403,6 +405,18 @@ static void memory(const char *path, bool save)
         fail(path);
 }
 
+static void connect_to_ground(const char *pins)
+{
+    for (; pins[0] != '\0' && pins[1] != '\0'; pins += 2) {
+        uint8_t mask = (uint8_t)(1u << (pins[1] - '0'));
+        for (const char *other = pins + 2; other[0] == pins[0] && other[1] != '\0'; other += 2, pins += 2)
+            mask = (uint8_t)(mask | 1u << (other[1] - '0'));
+        const uint32_t port = (uint8_t)pins[0];
+        avr_ioport_external_t ground = {.name = port & 0x7F, .mask = mask, .value = 0};
+        (void)avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &ground);
+    }
+}
+
 static void load(const char *mcu, const char *path)
 {
     elf_firmware_t image;
@@ -421,14 +435,12 @@ static void load(const char *mcu, const char *path)
 
 int main(int argc, char **argv)
 {
-    static const struct option options[] = {{"usb", no_argument, NULL, 'u'},
-                                            {"flat-out", no_argument, NULL, 'f'},
-                                            {"memory", required_argument, NULL, 'm'},
-                                            {"link", required_argument, NULL, 'l'},
-                                            {"script", required_argument, NULL, 's'},
-                                            {"program", no_argument, NULL, 'p'},
-                                            {NULL, 0, NULL, 0}};
-    const char *memory_path = NULL, *link_path = NULL, *script_path = NULL;
+    static const struct option options[] = {
+        {"usb", no_argument, NULL, 'u'},          {"flat-out", no_argument, NULL, 'f'},
+        {"memory", required_argument, NULL, 'm'}, {"link", required_argument, NULL, 'l'},
+        {"script", required_argument, NULL, 's'}, {"program", no_argument, NULL, 'p'},
+        {"low", required_argument, NULL, 'g'},    {NULL, 0, NULL, 0}};
+    const char *pins = "", *memory_path = NULL, *link_path = NULL, *script_path = NULL;
     bool flat_out = false, is_program = false;
     for (int option; (option = getopt_long(argc, argv, "", options, NULL)) != -1;)
         switch (option) {
@@ -447,6 +459,9 @@ int main(int argc, char **argv)
         case 's':
             script_path = optarg;
             break;
+        case 'g':
+            pins = optarg;
+            break;
         case 'p':
             is_program = true;
             break;
@@ -458,6 +473,7 @@ int main(int argc, char **argv)
         fail("usage: avr_board [--usb] [--flat-out] [--memory FILE] [--link PATH] [--script FILE | --program] MCU "
              "IMAGE.elf");
     load(argv[optind], argv[optind + 1]);
+    connect_to_ground(pins);
     if (memory_path != NULL)
         memory(memory_path, false);
     (void)signal(SIGTERM, stop);

@@ -16,12 +16,15 @@ from images import between, point, spaced
 RUNNER, IMAGES, BOARD = (sys.argv.pop(1) for _ in range(3))
 MCU = {"uno": "atmega328p", "mega": "atmega2560", "leonardo": "atmega32u4"}[BOARD]
 IS_USB = BOARD == "leonardo"
+# Arduino's pins 2 to 5 as ports of the chip (the boards' circuit diagrams).
+STRAPS = {"uno": ["D2", "D3", "D4", "D5"], "mega": ["E4", "E5", "G5", "E3"], "leonardo": ["D1", "D0", "D4", "C6"]}[BOARD]
 READY_US = 2_500_000  # a Leonardo is enumerated by then, and a TRIO has calibrated
 
 
-def run(controller, events, memory=None):
-    return images.run([RUNNER, *(["--usb"] if IS_USB else []), *(["--memory", memory] if memory else []), "--script", "-", MCU,
-                       str(Path(IMAGES, f"{BOARD}-{controller}.elf"))], events)
+def run(controller, events, memory=None, straps=()):
+    low = "".join(sorted(STRAPS[number] for number in straps))
+    options = [*(["--usb"] if IS_USB else []), *(["--memory", memory] if memory else []), "--low", low, "--script", "-"]
+    return images.run([RUNNER, *options, MCU, str(Path(IMAGES, f"{BOARD}-{controller}.elf"))], events)
 
 
 class Commands(unittest.TestCase):
@@ -162,6 +165,26 @@ class Stream(unittest.TestCase):
         sent = self.stream(15, noise=b"\xee\x22" * 20, more=[(begin + 305_000, burst)])
         _, rest, _ = self.frames(sent)
         self.assertEqual(rest, b"\r" * 5 + b"\x01" + moves[-1] + b"\r")
+
+
+class Straps(unittest.TestCase):
+    def answer(self, controller, straps, ask):
+        sent = run(controller, [(READY_US, ask), (READY_US + 50_000, "stop")], straps=straps)
+        return bytes(byte for us, byte in sent if us >= READY_US)
+
+    def test_each_strap(self):
+        self.assertEqual(self.answer("trio", [0], b"U"), b"\x02\x01\x01\x00\x00\r")
+        self.assertEqual(self.answer("mpc", [0], b"c"), point(10667, 10667, 10667) + b"\x1e\r")
+        self.assertEqual(self.answer("trio", [2], b"c"), point(8000, 8000, 8000) + b"\x1e\r")  # MP-285: 8 steps a um
+        self.assertEqual(self.answer("mpc", [1, 2], b"U"), b"\x04\x01\x01\x01\x01\r")
+
+    def test_switch_6_is_none(self):
+        there = point(1, 2, 3)
+        with tempfile.TemporaryDirectory() as temporary:
+            memory = str(Path(temporary, "memory"))
+            run("trio", [(READY_US, b"S\x0f" + there), (READY_US + 2_000_000, "off")], memory, straps=[3])
+            sent = run("trio", [(READY_US, b"c"), (READY_US + 50_000, "stop")], memory, straps=[3])
+            self.assertEqual(between(sent, 0, READY_US + 50_000), there + b"\x1e\r")
 
 
 class Memory(unittest.TestCase):
