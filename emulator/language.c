@@ -222,7 +222,7 @@ static const verb verbs_self[] = {
     {"help", "[VERB]", "list what can be told to the emulator", false, do_help},
     {NULL, NULL, NULL, false, NULL}};
 
-static const verb *const tables[] = {verbs_rig, verbs_self};
+static const verb *const tables[] = {verbs_rig, verbs_hands, verbs_self};
 #define TABLES (sizeof tables / sizeof tables[0])
 
 static const verb *find(const char *name)
@@ -326,6 +326,7 @@ cJSON *language_do(language *l, const char *line, bool *follows)
 
 void language_close(language *l)
 {
+    verbs_hands_close(l->e);
     for (planned *p = l->e->plans, *next; p != NULL; p = next) {
         next = p->next;
         if (p->strike == strike) {

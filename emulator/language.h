@@ -66,6 +66,9 @@ bool telling_command(telling *t, dr_op *op);
 bool telling_later(telling *t, uint64_t when_us, const char *line, bool is_passive);
 
 /* Tables. */
-extern const verb verbs_rig[]; /* clock, power, plugs, settings; the last has no name */
+extern const verb verbs_rig[];   /* clock, power, plugs, settings; the last has no name */
+extern const verb verbs_hands[]; /* buttons, knobs, switches, the display */
+/* Forgets the buttons that are down. */
+void verbs_hands_close(engine *e);
 
 #endif

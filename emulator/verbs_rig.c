@@ -332,6 +332,9 @@ static bool set_angle(telling *t)
     if (!telling_ends(t))
         return false;
     controller(t)->drives[controller(t)->active].diagonal = diagonal;
+    for (uint8_t number = 1; number <= 4; number++) /* the switches stand so too, or a power cycle would undo it */
+        (void)dr_panel_switch(&t->s->ins.panel, DR_SWITCHES_REAR, controller(t)->active, number,
+                              ((unsigned)diagonal >> (number - 1u) & 1u) != 0);
     return true;
 }
 
