@@ -131,6 +131,8 @@ static void start_program(char path[64], ...)
     for (const char *word; count + 1 < WORDS_MAX && (word = va_arg(arguments, const char *)) != NULL;)
         words[count++] = strdup(word); /* execv() wants its own */
     words[count] = NULL;
+    if (count == 0 || words[0] == NULL)
+        give_up("no memory");
     va_end(arguments);
     if (pipe(out) != 0)
         give_up("pipe");

@@ -1,11 +1,14 @@
 """What the tests of the program dryrig-guard share: a guard in front of an emulator, and its second channel."""
+import concurrent.futures
 import contextlib
 import json
 import os
 import signal
 import socket
 import subprocess
+import sys
 import time
+import unittest
 
 import emu
 
@@ -171,3 +174,27 @@ def position_mpc(reply):
 def pause(seconds):
     """For what takes its time in the real world, as a move does: never a measure of anything."""
     time.sleep(seconds)
+
+
+def each_test(suite):
+    for part in suite:
+        if isinstance(part, unittest.TestSuite):
+            yield from each_test(part)
+        else:
+            yield part
+
+
+def main(threads=4):
+    """unittest.main(), with several tests at once: each waits most of its time, for the second after which a controller is asked
+    who it is. With arguments it is unittest.main() itself."""
+    if len(sys.argv) > 1:
+        unittest.main(module="__main__")
+    tests = list(each_test(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])))
+    with concurrent.futures.ThreadPoolExecutor(threads) as pool:
+        results = list(pool.map(lambda test: test.run(), tests))
+    for result in results:
+        for test, words in result.failures + result.errors:
+            print(f"{test}\n{words}", file=sys.stderr)
+    bad = sum(not result.wasSuccessful() for result in results)
+    print(f"{len(tests)} tests, {bad} of them failed")
+    sys.exit(1 if bad or not tests else 0)

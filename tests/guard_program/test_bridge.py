@@ -317,4 +317,4 @@ class Rest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    guard.main()

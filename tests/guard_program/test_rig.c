@@ -113,12 +113,10 @@ static char *changed(const char *text, const char *find, const char *put, unsign
 {
     const char *const at = strstr(text, find);
     TEST_ASSERT_NOT_NULL_MESSAGE(at, find);
-    char *const out = malloc(strlen(text) + strlen(put) + 1);
+    const size_t before = (size_t)(at - text), size = strlen(text) + strlen(put) + 1;
+    char *const out = malloc(size);
     TEST_ASSERT_NOT_NULL(out);
-    const size_t before = (size_t)(at - text);
-    memcpy(out, text, before);
-    (void)strcpy(out + before, put);
-    (void)strcat(out, at + strlen(find));
+    (void)snprintf(out, size, "%.*s%s%s", (int)before, text, put, at + strlen(find));
     *line = 1;
     for (size_t i = 0; i < before; i++)
         *line += text[i] == '\n';
@@ -517,17 +515,13 @@ static void numbers_in_comments_and_texts_are_no_numbers(void)
 
 static void too_many_obstacles_are_told(void)
 {
-    static char text[sizeof trio + 64 * 128] = "";
-    const char *const end = strstr(trio, ");\n};"), *const last = strrchr(trio, ')');
-    (void)end;
-    (void)memcpy(text, trio, (size_t)(last - trio));
-    for (unsigned i = 0; i < 23; i++) { /* two and a cone are there */
-        char one[160];
-        (void)snprintf(one, sizeof one,
-                       ", { name = \"o%u\"; drive = 1; box_um = { x = (1, 2); y = (1, 2); z = (1, 2); }; }\n", i);
-        (void)strcat(text, one);
-    }
-    (void)strcat(text, ");\n");
+    static char text[sizeof trio + 64 * 128];
+    const int last = (int)(strrchr(trio, ')') - trio);
+    int used = snprintf(text, sizeof text, "%.*s", last, trio);
+    for (unsigned i = 0; i < 23; i++) /* two and a cone are there */
+        used += snprintf(text + used, sizeof text - (size_t)used,
+                         ", { name = \"o%u\"; drive = 1; box_um = { x = (1, 2); y = (1, 2); z = (1, 2); }; }\n", i);
+    (void)snprintf(text + used, sizeof text - (size_t)used, ");\n");
     TEST_ASSERT_FALSE(read_text(text, strlen(text)));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(why, "more than 32 obstacles"), why);
 }

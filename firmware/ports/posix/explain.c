@@ -320,8 +320,8 @@ static explain_result explain_split(FILE *out, const rig *r, const explain_scene
                                     size_t room)
 {
     dr_stage stage;
-    dr_command command;
-    dr_request request;
+    dr_command command = {.op = DR_OP_NONE};
+    dr_request request = {.op = DR_OP_NONE};
     char text[GUARD_WORDS_MAX];
     dr_scene scene = {.drive = s->drive,
                       .chosen = s->drive,

@@ -244,7 +244,6 @@ static void continue_clearing(bridge *b, const dr_guard_status *status)
         b->order_pressed = true;
         set_input(b, DR_INPUT_KEY, false);
         set_input(b, DR_INPUT_KEY, true);
-        orders_continue(b);
     } else {
         finish(b, has(status, DR_NEEDS_CLEAR | DR_NEEDS_IDENTITY) ? "the cause is still there: see fault and needs"
                                                                   : NULL);
@@ -258,14 +257,17 @@ void orders_continue(bridge *b)
         b->calibrate_until_us = 0;
         set_input(b, DR_INPUT_MAY_CALIBRATE, false);
     }
-    dr_guard_get_status(&b->guard, &status);
-    if (b->order == ORDER_ARM)
-        continue_arming(b, &status);
-    else if (b->order == ORDER_CLEAR)
-        continue_clearing(b, &status);
+    for (unsigned step = 0; step < 2 && b->order != ORDER_NONE; step++) { /* pressing, and what came of it */
+        dr_guard_get_status(&b->guard, &status);
+        if (b->order == ORDER_ARM)
+            continue_arming(b, &status);
+        else
+            continue_clearing(b, &status);
+    }
     if (b->order != ORDER_NONE && b->now_us >= b->order_until_us)
         finish(b, "something is under way: see state");
     /* What was allowed for one time of being armed ends with it. */
+    dr_guard_get_status(&b->guard, &status);
     const bool is_armed = status.state >= DR_GUARD_IDLE && status.state <= DR_GUARD_STOPPING;
     if (b->was_armed && !is_armed && status.escape)
         set_input(b, DR_INPUT_ESCAPE, false);
@@ -292,6 +294,21 @@ static void order_arm(bridge *b, control_client *who)
 }
 
 static bool is(const char *line, const char *order) { return strcmp(line, order) == 0; }
+
+/* "log", or "log N". */
+static bool is_log(const char *line, unsigned *count)
+{
+    static const char order[] = "log ";
+    const char *const number = line + sizeof order - 1;
+    *count = LOG_USUAL;
+    if (is(line, "log"))
+        return true;
+    if (strncmp(line, order, sizeof order - 1) != 0 || *number == '\0' || number[strspn(number, "0123456789")] != '\0')
+        return false;
+    const unsigned long wanted = strtoul(number, NULL, 10);
+    *count = wanted < JOURNAL_KEPT ? (unsigned)wanted : JOURNAL_KEPT;
+    return true;
+}
 
 /* Orders that are done when they have been given. False: it is none of them. */
 static bool set_at_once(bridge *b, const char *line)
@@ -322,8 +339,7 @@ static bool set_at_once(bridge *b, const char *line)
 void orders_take(void *context, control_client *who, const char *line)
 {
     bridge *const b = context;
-    unsigned count = LOG_USUAL;
-    char rest;
+    unsigned count;
     if (who->waits) { /* one after the other */
         control_say(who, "{\"ok\":false,\"why\":\"the last order has no answer yet\"}");
     } else if (is(line, "arm")) {
@@ -333,8 +349,8 @@ void orders_take(void *context, control_client *who, const char *line)
     } else if (is(line, "follow")) {
         who->follows = true;
         answer_status(b, who, NULL);
-    } else if (is(line, "log") || sscanf(line, "log %4u%c", &count, &rest) == 1) {
-        answer_log(b, who, count < JOURNAL_KEPT ? count : JOURNAL_KEPT);
+    } else if (is_log(line, &count)) {
+        answer_log(b, who, count);
     } else if (set_at_once(b, line)) {
         answer_status(b, who, NULL);
     } else {

@@ -107,7 +107,7 @@ static void check_text(reader *r, const char *text)
 static char *read_file(reader *r)
 {
     FILE *file = fopen(r->path, "re");
-    char *text = malloc(FILE_MAX + 2u);
+    char *text = calloc(1, FILE_MAX + 2u);
     if (file == NULL || text == NULL) {
         fail_at(r, 0, "%s", strerror(errno));
     } else {
@@ -727,8 +727,9 @@ static void check_whole(reader *r, const config_setting_t *root)
 
 bool rig_read(rig *out, const char *path, char *why, size_t room)
 {
-    reader r = {.path = path, .why = why, .room = room, .out = out};
+    reader r = {.path = path, .room = room, .out = out};
     config_t config;
+    r.why = why;
     memset(out, 0, sizeof *out);
     char *const content = read_file(&r);
     if (content == NULL)
