@@ -149,6 +149,7 @@ static void row_39_a_lost_cr(void)
     fake.no_cr = true;
     fake_move(3000);
     expect_state(DR_GUARD_FAULT);
+    TEST_ASSERT_EQUAL(DR_NEEDS_CLEAR, status().needs);
     expect_fault(DR_FAULT_NO_CR);
     expect_silence();
     TEST_ASSERT_TRUE(wire_stops() >= 1);
@@ -569,6 +570,8 @@ static void proof_is_given_up_and_tried_again_by_the_key(void)
     run_ms(200000);
     expect_state(DR_GUARD_LOCKED);
     TEST_ASSERT_EQUAL(0, rig.guard.task);
+    host_code('c'); /* nobody knows who would answer */
+    expect_refused(DR_REASON_NOT_ARMED);
     rig.wire_taken = rig.wire_count;
     fake.at[0] = fake.at[1] = fake.at[2] = 40000;
     fake.silent = false;

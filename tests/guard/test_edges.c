@@ -407,6 +407,8 @@ static void a_frame_that_nobody_pulls_on_is_never_overwritten(void)
     TEST_ASSERT_EQUAL('I', byte);
     rig.now += 5000000;
     TEST_ASSERT_EQUAL(0, dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 0));
+    host_code('C');
+    expect_refused(DR_REASON_BUSY);
     stop_input(true);
     rig.now += 500000;
     TEST_ASSERT_EQUAL(0, dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 0));

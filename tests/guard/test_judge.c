@@ -408,6 +408,7 @@ static void row_13_out_of_an_obstacle_only_by_its_exit(void)
     dr_obstacle *o = keep_out(4000, 6000, 4000, 6000, 4800, 6000);
     REFUSED(DR_REASON_KEEP_OUT, dr_judge_place(&limits, 0, scene.start_steps).reason);
     REFUSED(DR_REASON_ESCAPE, judge('S', 5000, 5000, 4700)); /* no exit: by hand */
+    REFUSED(DR_REASON_ESCAPE, judge('S', 5000, 5000, 4999));
     o->exit = DR_TO_LESS_Z;
     ALLOWED(judge('S', 5000, 5000, 4700));
     ALLOWED(judge('S', 5002, 4998, 4900)); /* rounding */
