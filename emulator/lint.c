@@ -308,8 +308,12 @@ static void judge_turn(lint *l, const lint_station *s, const observation *seen, 
     if (s->is_excused || s->command_ns == 0)
         return;
     const uint64_t waited_us = us_between(s->command_ns, s->began_ns);
+    const bool follows_position = s->last == DR_OP_TRIO_POSITION || s->last == DR_OP_MPC_POSITION;
     if (was_owed) {
-        if ((command->is & DR_IS_QUERY) != 0 && is_moving_for_host(c) && s->in_flight == 0)
+        if (follows_position && s->in_flight == 0 && !is_moving_for_host(c) && c->kept_bytes == 0 &&
+            dr_controller_ready(c) + s->unread == 1) /* a slow line: the 14th is still on its way */
+            find(l, s, seen, LINT_THIRTEEN_BYTES, bytes, count, "1 byte of the position was still to come");
+        else if ((command->is & DR_IS_QUERY) != 0 && is_moving_for_host(c) && s->in_flight == 0)
             find(l, s, seen, LINT_QUERY_IN_MOVE, bytes, count, "during %s", dr_words_command((dr_op)c->move_op)->name);
         else if (waited_us >= LINT_GAVE_UP_US)
             find(l, s, seen, LINT_SHORT_TIME_LIMIT, bytes, count, "%llu ms after %s, whose CR had not come",
@@ -318,7 +322,7 @@ static void judge_turn(lint *l, const lint_station *s, const observation *seen, 
             find(l, s, seen, LINT_EARLY_COMMAND, bytes, count, "%s was not yet answered", before);
         return;
     }
-    if (s->unread == 1 && (s->last == DR_OP_TRIO_POSITION || s->last == DR_OP_MPC_POSITION))
+    if (s->unread == 1 && follows_position)
         find(l, s, seen, LINT_THIRTEEN_BYTES, bytes, count, "1 byte of the position was still unread");
     else if (s->unread > 0)
         find(l, s, seen, LINT_UNREAD_REPLY, bytes, count, "%lu byte%s unread, the last answer was that to %s",

@@ -12,6 +12,8 @@
 #include "lint.h"   /* which rules the host breaks */
 #include "lint_report.h"
 #include "options.h" /* what was asked for */
+#include "record.h"  /* the bytes of the line, kept */
+#include "replay.h"  /* and played again */
 #include "trace.h"   /* what happens, in words */
 
 #include "dr_words.h" /* names for people */
@@ -39,6 +41,8 @@ typedef struct {
     lint lint;
     observer_link *lint_links;
     FILE *lint_json, *lint_junit;
+    recorder recorder;
+    observer_link *record_links;
     int signal_fd;
     sigset_t mask_before;
     pid_t child; /* 0: none */
@@ -239,7 +243,8 @@ static bool set_up(program *p)
     e->stations = calloc(o->rig.count, sizeof *e->stations);
     p->trace_links = calloc(o->rig.count, sizeof *p->trace_links);
     p->lint_links = calloc(o->rig.count, sizeof *p->lint_links);
-    if (e->stations == NULL || p->trace_links == NULL || p->lint_links == NULL)
+    p->record_links = calloc(o->rig.count, sizeof *p->record_links);
+    if (e->stations == NULL || p->trace_links == NULL || p->lint_links == NULL || p->record_links == NULL)
         return false;
     for (unsigned i = 0; i < e->station_count; i++) {
         station *const s = &e->stations[i];
@@ -261,6 +266,23 @@ static bool open_trace(program *p)
     for (unsigned i = 0; i < p->e.station_count; i++) {
         p->trace_links[i].who = &p->trace.base;
         station_observe(&p->e.stations[i], &p->trace_links[i]);
+    }
+    return true;
+}
+
+static bool open_record(program *p)
+{
+    if (p->o->record == NULL)
+        return true;
+    if (!recorder_open(&p->recorder, p->o->record)) {
+        (void)fprintf(stderr, "dryrig-emu: --record %s: %s\n", p->o->record, strerror(errno));
+        return false;
+    }
+    for (unsigned i = 0; i < p->e.station_count; i++) {
+        station *const s = &p->e.stations[i];
+        recorder_introduce(&p->recorder, s->name, &s->ins);
+        p->record_links[i].who = &p->recorder.base;
+        station_observe(s, &p->record_links[i]);
     }
     return true;
 }
@@ -329,7 +351,7 @@ static void start_and_run(program *p)
 {
     char why[PATH_ROOM + 256];
     p->status = 1;
-    if (!open_trace(p) || !open_lint(p))
+    if (!open_trace(p) || !open_lint(p) || !open_record(p))
         return;
     if (!desk_open(&p->desk, &p->e, p->trace.file == NULL ? NULL : &p->trace, p->o->control, why, sizeof why)) {
         (void)fprintf(stderr, "dryrig-emu: --control: %s\n", why);
@@ -371,6 +393,7 @@ static int run(program *p)
         desk_close(&p->desk);
         engine_close(&p->e);
         trace_close(&p->trace);
+        recorder_close(&p->recorder);
         report_lint(p);
     } else {
         (void)fprintf(stderr, "dryrig-emu: %s\n", why);
@@ -394,6 +417,8 @@ int main(int argc, char **argv)
     static options o;
     o = options_read(argc, argv);
     p.o = &o;
+    if (o.task == TASK_REPLAY)
+        return replay(o.replay);
     if (o.task == TASK_CHECK) {
         (void)printf("%s: %u controller%s, nothing wrong\n", o.rig_file, o.rig.count, o.rig.count == 1 ? "" : "s");
         return 0;

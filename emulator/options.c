@@ -55,7 +55,8 @@ enum {
     LINT,
     LINT_JSON,
     LINT_JUNIT,
-    STRICT
+    STRICT,
+    RECORD
 };
 
 static const struct argp_option known[] = {
@@ -93,6 +94,7 @@ static const struct argp_option known[] = {
     {"speedup", SPEEDUP, "N", 0, "Run the controller's clock and its line N times faster, 1 to 1000", 4},
     {"wait-client", WAIT_CLIENT, NULL, 0, "The controller's clock stands until somebody has opened the port", 4},
     {"trace", TRACE, "FILE", 0, "Write what happens, in words, to FILE; '-' is stderr", 5},
+    {"record", RECORD, "FILE", 0, "Write the bytes of both directions, with times, to FILE", 5},
     {"control", CONTROL, "PATH", 0,
      "Make a socket PATH that takes commands: 'dryrig-emu ctl PATH help', see dryrig-control(7)", 5},
     {"do", DO, "COMMAND", 0, "Do this at the start, in the same language; may be repeated", 5},
@@ -187,6 +189,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case LINT_JUNIT:
         once(state, &t->o->lint_junit, "lint-junit", value);
         break;
+    case RECORD:
+        once(state, &t->o->record, "record", value);
+        break;
     case STRICT:
         t->o->is_strict = true;
         break;
@@ -215,6 +220,13 @@ static void read_task(options *o, typed *t)
     } else if (o->command != NULL) {
         refuse("'-- %s' has a meaning after run only: dryrig-emu run mpc -- COMMAND",
                o->command[0] ? o->command[0] : "");
+    }
+    if (strcmp(first, "replay") == 0) {
+        o->task = TASK_REPLAY;
+        if (t->word_count != 2)
+            refuse("replay: one recording, please: dryrig-emu replay FILE");
+        o->replay = t->words[1];
+        return;
     }
     if (strcmp(first, "rig") == 0) {
         at = t->word_count > 1 && strcmp(t->words[1], "check") == 0 ? 2 : 1;
@@ -308,6 +320,7 @@ options options_read(int argc, char **argv)
         known,
         parse,
         "trio|mpc\nrun trio|mpc -- COMMAND [ARGUMENT...]\nrun --rig FILE -- COMMAND [ARGUMENT...]\nrig [check] FILE\n"
+        "replay FILE\n"
         "ctl PATH COMMAND",
         "Stands in for a Sutter TRIO MP-245A (trio) or MPC-200 (mpc) micromanipulator controller on a pseudo-terminal. "
         "Prints 'ready' and the port's path, and runs until SIGINT, SIGTERM or SIGHUP.\n"
@@ -332,6 +345,8 @@ options options_read(int argc, char **argv)
     (void)argp_parse(&argp, own, argv, 0, NULL, &t);
 
     read_task(&o, &t);
+    if (o.task == TASK_REPLAY) /* the recording says the rest */
+        return o;
     o.clock = read_clock(t.clock);
     char why[WHY_ROOM];
     o.speedup = 1;

@@ -11,7 +11,8 @@
 typedef enum {
     TASK_EMULATE, /* one controller, or those of a rig file */
     TASK_RUN,     /* the same, for as long as a command runs */
-    TASK_CHECK    /* is this rig file right? */
+    TASK_CHECK,   /* is this rig file right? */
+    TASK_REPLAY   /* does a controller still answer as in this recording? */
 } task;
 
 typedef struct {
@@ -26,6 +27,8 @@ typedef struct {
     bool lints;                         /* tells at the end which rules the host has broken */
     const char *lint_json, *lint_junit; /* files for the same; NULL: none */
     bool is_strict;                     /* TASK_RUN: findings turn the command's exit status 0 into 3 */
+    const char *record;                 /* where the bytes of the line go; NULL: nowhere */
+    const char *replay;                 /* TASK_REPLAY: the recording */
     const char *control;                /* NULL: none */
     const char *dos[OPTIONS_DO_MAX];
     unsigned do_count;

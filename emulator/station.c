@@ -196,7 +196,8 @@ void station_take(station *s, uint64_t now_us, uint64_t now_ns)
         seen.bytes = s->chunk;
         seen.count = s->chunk_count;
         seen.pause_us = pause;
-        seen.unread = s->unread;
+        const uint32_t unread = count_unread(s); /* with what has been due since: it had not read that either */
+        seen.unread = unread > s->unread ? unread : s->unread;
         observe(s->observers, &seen);
     }
     (void)instrument_take(&s->ins, pause, s->chunk, s->chunk_count);

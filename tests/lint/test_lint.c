@@ -561,6 +561,35 @@ static void a_program_that_reads_13_bytes_of_14_is_named(void)
     found(LINT_THIRTEEN_BYTES, 1);
 }
 
+/* Byte 13 has left 174 + 2,257 us after the question, byte 14 leaves at 174 + 2,431 us [T table 3]. */
+static void a_program_that_goes_on_when_the_13th_byte_is_there_is_named(void)
+{
+    start(DR_TRIO);
+    b.ins.is_paced = true;
+    instrument_start(&b.ins, 0);
+    bench_wait_us(&b, 0);
+    bench_say(&b, "c", 1);
+    bench_wait_us(&b, 174 + 2257);
+    TEST_ASSERT_EQUAL(13, b.unread);
+    bench_read(&b, ALL);
+    bench_say(&b, "h", 1);
+    found(LINT_THIRTEEN_BYTES, 1);
+}
+
+static void a_program_that_goes_on_when_the_12th_byte_is_there_is_early(void)
+{
+    start(DR_TRIO);
+    b.ins.is_paced = true;
+    instrument_start(&b.ins, 0);
+    bench_wait_us(&b, 0);
+    bench_say(&b, "c", 1);
+    bench_wait_us(&b, 174 + 2084);
+    TEST_ASSERT_EQUAL(12, b.unread);
+    bench_read(&b, ALL);
+    bench_say(&b, "h", 1);
+    found(LINT_EARLY_COMMAND, 1);
+}
+
 static void a_program_that_reads_12_bytes_of_14_leaves_2_unread(void)
 {
     start(DR_TRIO);
@@ -687,6 +716,8 @@ int main(void)
     RUN_TEST(another_baud_rate_is_wrong);
     RUN_TEST(the_controllers_baud_rates_are_right);
     RUN_TEST(a_program_that_reads_13_bytes_of_14_is_named);
+    RUN_TEST(a_program_that_goes_on_when_the_13th_byte_is_there_is_named);
+    RUN_TEST(a_program_that_goes_on_when_the_12th_byte_is_there_is_early);
     RUN_TEST(a_program_that_reads_12_bytes_of_14_leaves_2_unread);
     RUN_TEST(a_program_that_ends_with_a_byte_of_the_position_unread_is_named);
     RUN_TEST(a_speed_of_16_is_too_high);

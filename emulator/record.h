@@ -1,0 +1,25 @@
+/* record: an observer that writes what went over the line into a recording (dr_record.h).
+ *
+ * Thread-safety: one thread at a time per recorder. */
+#ifndef RECORD_H
+#define RECORD_H
+
+#include "observe.h" /* whose observations it keeps */
+
+#include <stdio.h>
+
+typedef struct {
+    observer base;
+    FILE *file;
+    const char *path; /* for messages */
+    uint64_t epoch_ns;
+    bool has_begun;
+} recorder;
+
+/* False: errno says why. */
+bool recorder_open(recorder *r, const char *path);
+/* What a controller is at the beginning: called once for each, when it is set up and before anything has happened. */
+void recorder_introduce(recorder *r, const char *name, const instrument *ins);
+void recorder_close(recorder *r);
+
+#endif

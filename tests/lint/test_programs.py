@@ -1,0 +1,167 @@
+"""run, lint, --record and replay through the port: programs that are right, and the example of docs/ci.md, which is not."""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree
+
+EMULATOR = os.environ["DRYRIG_EMU"]
+DRYRIG = os.environ["DRYRIG"]
+EXAMPLE = os.environ["CI_EXAMPLE"]
+LIMIT_S = 50
+
+# Every command of the command line, for each controller.
+RIGHT = {
+    "mpc": ["info", "position", "move 1000 2000 500", "line 100 200 300 --speed 15", "line 200 300 400 --speed 15 --stream",
+            "home", "work", "stop", "mode 3", "select 2", "calibrate", "axis x 100"],
+    "trio": ["info", "position", "move 1000 2000 500", "line 100 200 300 --speed 15", "home", "work", "stop", "angle 45",
+             "calibrate", "axis x 100", "axis y 200", "axis z 1"],
+}
+RECORDED = {
+    "mpc": ["move 100 200 50", "line 200 300 400 --speed 15 --stream", "select 2"],
+    "trio": ["info", "line 100 200 300 --speed 15", "work"],
+}
+STAGE = {"mpc": "MP-225", "trio": "MP-845"}
+
+
+def emulator(*args):
+    done = subprocess.run([EMULATOR, *args], stdin=subprocess.DEVNULL, capture_output=True, timeout=LIMIT_S, check=False)
+    return done.returncode, done.stdout.decode(), done.stderr.decode()
+
+
+def script(kind, commands):
+    program = f"{DRYRIG} -p $DRYRIG_PORT -c {kind} -s {STAGE[kind]} "
+    return ["sh", "-ec", "\n".join(program + words for words in commands)]
+
+
+def example(name):
+    return [sys.executable, os.path.join(EXAMPLE, name)]
+
+
+class Lint(unittest.TestCase):
+    def test_the_command_line_breaks_no_rule(self):
+        for kind in RIGHT:
+            with self.subTest(kind):
+                status, _, err = emulator("run", kind, "--clock", "jump", "--work", "160,160,160", "--strict", "--",
+                                          *script(kind, RIGHT[kind]))
+                self.assertEqual((0, ""), (status, err))
+
+    def test_the_example_passes_with_a_fake_port(self):
+        done = subprocess.run([sys.executable, "test_fake.py"], cwd=EXAMPLE, capture_output=True, timeout=LIMIT_S,
+                              check=False)
+        self.assertEqual(0, done.returncode, done.stderr)
+
+    def test_the_bugs_of_the_example_are_found(self):
+        with tempfile.TemporaryDirectory() as where:
+            as_json, as_xml = os.path.join(where, "lint.json"), os.path.join(where, "lint.xml")
+            status, _, err = emulator("run", "mpc", "--strict", "--lint-json", as_json, "--lint-junit", as_xml, "--",
+                                      *example("stage.py"))
+            self.assertEqual(3, status, err)
+            with open(as_json, encoding="utf-8") as file:
+                report = json.load(file)
+            found = {finding["name"] for finding in report["findings"]}
+            self.assertEqual({"no-pause-in-s", "thirteen-bytes", "query-in-move"}, found - {"unread-reply"})
+            pause = next(f for f in report["findings"] if f["name"] == "no-pause-in-s")
+            self.assertEqual("53 0F 80 3E 00 00 80 3E 00 00 40 1F 00 00", pause["bytes"])
+            self.assertEqual(len(report["findings"]), report["count"])
+            suite = xml.etree.ElementTree.parse(as_xml).getroot().find("testsuite")
+            self.assertEqual(len(report["rules"]), int(suite.get("tests")))
+            failed = {case.get("name").split()[1] for case in suite if case.find("failure") is not None}
+            self.assertEqual(found, failed)
+            for name in found:
+                self.assertIn(name, err)
+
+    def test_the_example_without_its_bugs_breaks_no_rule(self):
+        for clock in ("real", "jump"):
+            with self.subTest(clock):
+                status, _, err = emulator("run", "mpc", "--strict", "--clock", clock, "--", *example("stage_fixed.py"))
+                self.assertEqual((0, ""), (status, err))
+
+    def test_strict_changes_nothing_but_0(self):
+        burst = "exec 3<>$DRYRIG_PORT; printf 'CC' >&3; dd bs=28 count=1 iflag=fullblock <&3 2>&1 >/dev/null; exit "
+        for wanted, options in ((0, []), (3, ["--strict"]), (0, ["--lint=off"])):
+            self.assertEqual(wanted, emulator("run", "mpc", *options, "--", "sh", "-c", burst + "0")[0])
+        self.assertEqual(7, emulator("run", "mpc", "--strict", "--", "sh", "-c", burst + "7")[0])
+        self.assertIn("early-command", emulator("run", "mpc", "--", "sh", "-c", burst + "0")[2])
+        self.assertEqual("", emulator("run", "mpc", "--lint=off", "--", "sh", "-c", "exit 0")[2])
+        self.assertEqual(2, emulator("mpc", "--strict")[0])
+
+    def test_a_baud_rate_that_the_controller_does_not_have(self):
+        program = "import os, serial; p = serial.Serial(os.environ['DRYRIG_PORT'], {}); p.write(b'c'); p.read(14)"
+        for baud, wanted in ((9600, True), (57600, False)):
+            _, _, err = emulator("run", "trio", "--", sys.executable, "-c", program.format(baud))
+            self.assertEqual(wanted, "wrong-baud" in err, err)
+
+
+class Recordings(unittest.TestCase):
+    def setUp(self):
+        self.where = tempfile.TemporaryDirectory()
+        self.path = os.path.join(self.where.name, "line.rec")
+
+    def tearDown(self):
+        self.where.cleanup()
+
+    def record(self, kind, *options):
+        status, _, err = emulator("run", kind, "--record", self.path, *options, "--",
+                                  *script(kind, RECORDED[kind]))
+        self.assertEqual(0, status, err)
+
+    def test_what_is_recorded_is_replayed_to_the_byte_and_the_microsecond(self):
+        for kind in RIGHT:
+            for clock in (("--clock", "jump"), ("--speedup", "20")):
+                with self.subTest(f"{kind} {clock}"):
+                    self.record(kind, *clock, "--work", "160,160,160")
+                    status, out, err = emulator("replay", self.path)
+                    self.assertEqual((0, ""), (status, err), out)
+                    self.assertRegex(out, rf"{kind}: 0 of \d\d+ answers differ; they came when recorded\.")
+
+    def test_quirks_and_positions_are_recorded(self):
+        status, _, err = emulator("run", "mpc", "--record", self.path, "--quirks", "position-13,nul-heartbeat", "--device",
+                                  "MP-845", "--position", "16,17,18", "--angle", "14more", "--", "sh", "-c",
+                                  "exec 3<>$DRYRIG_PORT; printf C >&3; dd bs=13 count=1 iflag=fullblock <&3 2>&1 >/dev/null")
+        self.assertEqual(0, status, err)
+        with open(self.path, encoding="ascii") as file:
+            lines = file.read().splitlines()
+        for line in ("set mpc device MP-845", "set mpc position 16,17,18", "set mpc angle 14more",
+                     "set mpc quirks position-13,nul-heartbeat", "set mpc pace on"):
+            self.assertIn(line, lines)
+        self.assertEqual(0, emulator("replay", self.path)[0])
+
+    def test_a_difference_names_both_sides_and_goes_on(self):
+        self.record("trio", "--clock", "jump")
+        with open(self.path, encoding="ascii") as file:
+            lines = file.readlines()
+        first = next(i for i, line in enumerate(lines) if " < " in line)
+        lines[first] = lines[first].replace(" < AB 29", " < AC 29")
+        with open(self.path, "w", encoding="ascii") as file:
+            file.writelines(lines)
+        status, out, _ = emulator("replay", self.path)
+        self.assertEqual(1, status)
+        self.assertIn("recorded:  AC 29 00 00", out)
+        self.assertIn("replayed:  AB 29 00 00", out)
+        self.assertRegex(out, r"trio: 1 of \d\d+ answers differ; the others came when recorded")
+
+    def test_what_is_no_recording(self):
+        for text, wanted in (("", "line.rec:0: it is empty"), ("\x7fELF\n", "line.rec:1: it is no recording"),
+                             ("dryrig-recording 1\n0.000000 0.000000 a > 43\n", "line.rec:2: which controller?"),
+                             ("dryrig-recording 1\nset a controller xyz\n0.000000 0.000000 a > 43\n", "line.rec:3: "),
+                             ("dryrig-recording 1\nset a colour red\n", "line.rec:2: no such setting")):
+            with open(self.path, "w", encoding="ascii") as file:
+                file.write(text)
+            status, _, err = emulator("replay", self.path)
+            self.assertEqual(2, status)
+            self.assertIn(wanted, err)
+        status, _, err = emulator("replay", "/nowhere/to.be")
+        self.assertEqual(2, status)
+
+    def test_it_can_be_explained(self):
+        self.record("mpc", "--clock", "jump", "--work", "160,160,160")
+        done = subprocess.run([DRYRIG, "decode", self.path], capture_output=True, timeout=LIMIT_S, check=False)
+        self.assertEqual((0, b""), (done.returncode, done.stderr))
+        self.assertIn(b"make active drive 2", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
