@@ -53,6 +53,11 @@ class Lint(unittest.TestCase):
                               check=False)
         self.assertEqual(0, done.returncode, done.stderr)
 
+    def test_the_example_has_a_controller_for_each_test(self):
+        done = subprocess.run([sys.executable, "test_stage.py"], cwd=EXAMPLE, capture_output=True, timeout=LIMIT_S,
+                              check=False)
+        self.assertEqual(0, done.returncode, done.stderr)
+
     def test_the_bugs_of_the_example_are_found(self):
         with tempfile.TemporaryDirectory() as where:
             as_json, as_xml = os.path.join(where, "lint.json"), os.path.join(where, "lint.xml")
