@@ -54,14 +54,25 @@ static instrument_sending next_to_send(instrument *ins)
     if ((ins->quirks & INSTRUMENT_POSITION_13) != 0 && op == DR_OP_MPC_POSITION && first) {
         uint8_t drive; /* never gets onto the line */
         (void)dr_controller_pull(c, instrument_now(ins), &drive, 1);
+        ins->faults.at++;
     }
     return INSTRUMENT_REPLY;
+}
+
+/* Does a fault hold up what is to be sent? It is asked once for each byte. */
+static bool is_held(instrument *ins)
+{
+    if (dr_controller_ready(&ins->controller) == 0 || !faults_any(&ins->faults))
+        ins->held_until_us = 0;
+    else if (ins->held_until_us <= ins->now_us)
+        ins->held_until_us = faults_hold_us(&ins->faults, ins->now_us, &ins->controller);
+    return ins->held_until_us > ins->now_us;
 }
 
 /* Gives the line something to carry, if it is free. */
 static void feed_line(instrument *ins)
 {
-    if (ins->sending != INSTRUMENT_NOTHING)
+    if (ins->sending != INSTRUMENT_NOTHING || is_held(ins))
         return;
     ins->sending = (uint8_t)next_to_send(ins);
     if (ins->sending != INSTRUMENT_NOTHING)
@@ -79,7 +90,7 @@ static size_t finish_byte(instrument *ins, uint8_t *bytes, size_t room)
     case INSTRUMENT_LETTER_I: /* before the CR, or in its place */
         count = dr_controller_ready(&ins->controller) > 0 ? 1 : 0;
         if (dr_controller_answers_stop(&ins->controller))
-            (void)dr_controller_pull(&ins->controller, instrument_now(ins), bytes, 1);
+            ins->faults.is_answering = dr_controller_pull(&ins->controller, instrument_now(ins), bytes, 1) == 0;
         bytes[0] = LETTER_I;
         break;
     case INSTRUMENT_NUL:
@@ -87,10 +98,12 @@ static size_t finish_byte(instrument *ins, uint8_t *bytes, size_t room)
         break;
     default: /* where bytes take no time, all leave at once, but not across the edge of a reply that a quirk changes */
         count = dr_controller_pull(&ins->controller, instrument_now(ins), bytes,
-                                   ins->byte_num == 0 && ins->quirks == 0 ? room : 1);
+                                   ins->byte_num == 0 && ins->quirks == 0 && !faults_any(&ins->faults) ? room : 1);
         break;
     }
     ins->to_host.bytes += count;
+    if (sent == INSTRUMENT_REPLY && count == 1 && ins->faults.is_answering)
+        count = faults_byte(&ins->faults, bytes[0], bytes);
     return count;
 }
 
@@ -155,6 +168,9 @@ static void arrive(instrument *ins)
     ins->arriving_first = (uint16_t)((at + 1u) % INSTRUMENT_LINE_MAX);
     ins->arriving_count--;
     ins->from_host.bytes++;
+    if (faults_any(&ins->faults) &&
+        !faults_host_byte(&ins->faults, ins->now_us, &ins->controller, ins->arriving[at].byte))
+        return;
     if (ins->arriving[at].pause_us > 0)
         dr_controller_paused(&ins->controller, ins->arriving[at].pause_us);
     dr_controller_push(&ins->controller, instrument_now(ins), &ins->arriving[at].byte, 1);
@@ -184,8 +200,10 @@ bool instrument_due(const instrument *ins, uint64_t *when_us)
     uint64_t when;
     if (ins->sending != INSTRUMENT_NOTHING)
         have = earlier(have, through_us(ins, &ins->to_host, ins->to_host.bytes + 1u), when_us);
-    else if (dr_controller_ready(&ins->controller) > 0) /* hands have made it answer since the last run */
-        have = earlier(have, ins->now_us, when_us);
+    else if (ins->held_until_us > ins->now_us && ins->held_until_us < UINT64_MAX)
+        have = earlier(have, ins->held_until_us, when_us);
+    else if (dr_controller_ready(&ins->controller) > 0 && ins->held_until_us < UINT64_MAX)
+        have = earlier(have, ins->now_us, when_us); /* hands have made it answer since the last run */
     if (beat_due(ins, &when))
         have = earlier(have, when, when_us);
     if (arrival_due(ins, &when))
@@ -208,8 +226,15 @@ static size_t step(instrument *ins, uint8_t *bytes, size_t room)
         beat(ins);
     else if (arrival_due(ins, &when) && when == ins->now_us)
         arrive(ins);
+    if (faults_any(&ins->faults))
+        faults_look(&ins->faults, ins->now_us, &ins->controller);
     feed_line(ins);
     return count;
+}
+
+static bool has_news(const instrument *ins)
+{
+    return ins->faults.struck != 0 || (ins->controller.notes != NULL && ins->controller.notes->count > 0);
 }
 
 bool instrument_run(instrument *ins, uint64_t until_us, uint8_t *bytes, size_t room, size_t *count)
@@ -219,10 +244,10 @@ bool instrument_run(instrument *ins, uint64_t until_us, uint8_t *bytes, size_t r
     while (instrument_due(ins, &when) && when <= until_us) {
         ins->now_us = when;
         *count = step(ins, bytes, room);
-        if (*count > 0 || (ins->controller.notes != NULL && ins->controller.notes->count > 0))
+        if (*count > 0 || has_news(ins))
             return true;
     }
     if (until_us > ins->now_us)
         ins->now_us = until_us;
-    return ins->controller.notes != NULL && ins->controller.notes->count > 0;
+    return has_news(ins);
 }

@@ -19,6 +19,8 @@
 #ifndef INSTRUMENT_H
 #define INSTRUMENT_H
 
+#include "faults.h" /* what goes wrong, on demand */
+
 #include "dr_panel.h" /* the controller inside, and its panel */
 
 /* Quirks of reply bytes; the controller's own are in controller.quirks [P, quirks]. */
@@ -48,14 +50,18 @@ typedef struct {
      * controller answers. */
     dr_panel panel;
 
+    /* What goes wrong. Set up with faults_init(); its `struck` is for the caller to look at, and to clear. */
+    faults faults;
+
     /* to be read by anybody, written by instrument only */
     dr_panel_drive panel_drives[DR_PORTS];
     uint64_t now_us;             /* how far it has run */
     uint32_t byte_num, byte_den; /* a byte takes byte_num / byte_den us */
     instrument_line to_host, from_host;
-    uint8_t sending;  /* instrument_sending: what the line to the host carries now */
-    bool said_i;      /* the 'I' of this ^C has left */
-    uint64_t beat_us; /* the last heartbeat */
+    uint64_t held_until_us; /* a fault delays what is to be sent; UINT64_MAX: for good */
+    uint8_t sending;        /* instrument_sending: what the line to the host carries now */
+    bool said_i;            /* the 'I' of this ^C has left */
+    uint64_t beat_us;       /* the last heartbeat */
     struct {
         uint8_t byte;
         uint32_t pause_us;           /* the host's pause before it */
@@ -76,8 +82,8 @@ size_t instrument_room(const instrument *ins);
 size_t instrument_take(instrument *ins, uint32_t pause_us, const uint8_t *bytes, size_t count);
 
 /* Goes on to until_us, or to the first instant at which there is something to tell: bytes have left for the host (*count
- * of them at bytes[], at ins->now_us) or, where the controller has notes, notes wait. False: nothing to tell, and the
- * instrument is at until_us. `room` is at least 1. */
+ * of them at bytes[], at ins->now_us) or, where the controller has notes, notes wait, or a fault has struck. False: nothing
+ * to tell, and the instrument is at until_us. `room` is at least FAULT_BYTES_MAX. */
 bool instrument_run(instrument *ins, uint64_t until_us, uint8_t *bytes, size_t room, size_t *count);
 /* When something will happen next. False: nothing until the host sends or hands act. */
 bool instrument_due(const instrument *ins, uint64_t *when_us);

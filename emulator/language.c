@@ -222,7 +222,7 @@ static const verb verbs_self[] = {
     {"help", "[VERB]", "list what can be told to the emulator", false, do_help},
     {NULL, NULL, NULL, false, NULL}};
 
-static const verb *const tables[] = {verbs_rig, verbs_hands, verbs_self};
+static const verb *const tables[] = {verbs_rig, verbs_fault, verbs_hands, verbs_self};
 #define TABLES (sizeof tables / sizeof tables[0])
 
 static const verb *find(const char *name)

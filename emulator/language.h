@@ -67,6 +67,7 @@ bool telling_later(telling *t, uint64_t when_us, const char *line, bool is_passi
 
 /* Tables. */
 extern const verb verbs_rig[];   /* clock, power, plugs, settings; the last has no name */
+extern const verb verbs_fault[]; /* what goes wrong */
 extern const verb verbs_hands[]; /* buttons, knobs, switches, the display */
 /* Forgets the buttons that are down. */
 void verbs_hands_close(engine *e);

@@ -251,6 +251,7 @@ static bool set_up(program *p)
         s->name = o->rig.members[i].name;
         s->link = o->rig.members[i].link;
         setup_apply(&o->rig.members[i].setup, &s->ins, s->drives);
+        faults_init(&s->ins.faults, o->seed + i);
     }
     return true;
 }
@@ -379,6 +380,16 @@ static void start_and_run(program *p)
     engine_run(&p->e);
 }
 
+/* Where chance has had a say, the same again must be possible. */
+static void tell_seed(const program *p)
+{
+    bool has_chanced = false;
+    for (unsigned i = 0; i < p->e.station_count; i++)
+        has_chanced = has_chanced || p->e.stations[i].ins.faults.has_chanced;
+    if (has_chanced && p->o->seed_is_chosen)
+        (void)fprintf(stderr, "dryrig-emu: chance began with --seed %llu\n", (unsigned long long)p->o->seed);
+}
+
 static int run(program *p)
 {
     char why[PATH_ROOM + 256];
@@ -390,6 +401,7 @@ static int run(program *p)
         return fail("run: cannot make a directory for the command's ports (TMPDIR says where)");
     if (engine_plug(&p->e, why, sizeof why)) {
         start_and_run(p);
+        tell_seed(p);
         desk_close(&p->desk);
         engine_close(&p->e);
         trace_close(&p->trace);

@@ -77,6 +77,19 @@ static void tell_notes(station *s)
     }
 }
 
+static void tell_faults(station *s)
+{
+    const uint32_t struck = s->ins.faults.struck;
+    s->ins.faults.struck = 0;
+    for (unsigned id = 0; id < FAULTS; id++) {
+        char text[128];
+        const fault_words *const words = faults_words((fault_id)id);
+        (void)snprintf(text, sizeof text, "fault %s: %s", words->name, words->meaning);
+        if ((struck & UINT32_C(1) << id) != 0)
+            station_say(s, OBSERVED_FAULT, text);
+    }
+}
+
 /* -- Port and link ----------------------------------------------------------------------------------------------------- */
 
 bool station_plug(station *s, int inotify_fd, char *why, size_t room)
@@ -146,6 +159,8 @@ void station_run(station *s, uint64_t now_us, uint64_t now_ns)
     while (instrument_run(&s->ins, now_us, bytes, sizeof bytes, &count)) {
         if (s->ins.controller.notes != NULL && s->notes.count > 0)
             tell_notes(s);
+        if (s->ins.faults.struck != 0)
+            tell_faults(s);
         if (count > 0)
             send_to_host(s, bytes, count);
     }

@@ -90,6 +90,11 @@ static cJSON *device_json(const station *s, uint8_t i)
     dr_controller_position(c, i, (dr_us)s->ins.now_us, steps);
     add_point(out, "position_steps", steps);
     add_um(out, "position_um", steps, stage);
+    cJSON *const tip = cJSON_AddArrayToObject(out, "tip_steps"); /* where it really is: fault slip-axis */
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        (void)cJSON_AddItemToArray(
+            tip, cJSON_CreateNumber((double)((int64_t)steps[axis] -
+                                             faults_slipped_steps(&s->ins.faults, c, i, axis, (dr_us)s->ins.now_us))));
     if (drive->work_is_set)
         add_point(out, "work_steps", drive->work_steps);
     else
@@ -119,7 +124,7 @@ static cJSON *controller_json(const station *s)
     if (s->link != NULL)
         (void)cJSON_AddStringToObject(out, "link", s->link);
     (void)cJSON_AddBoolToObject(out, "is_open", s->port.opens > 0);
-    (void)cJSON_AddStringToObject(out, "state", state_name(c));
+    (void)cJSON_AddStringToObject(out, "state", s->ins.faults.is_wedged ? "wedged" : state_name(c));
     if (c->state == DR_STATE_MOVING || c->state == DR_STATE_PAUSED)
         (void)cJSON_AddStringToObject(out, "move", dr_words_command((dr_op)c->move_op)->name);
     (void)cJSON_AddNumberToObject(out, "active", c->active + 1);
@@ -194,6 +199,7 @@ static bool power(telling *t, bool on)
     if (on != (controller(t)->state == DR_STATE_OFF))
         return telling_wrong(t, on ? "it is on" : "it is off");
     dr_panel_power(&t->s->ins.panel, now(t), on);
+    faults_look(&t->s->ins.faults, t->s->ins.now_us, controller(t));
     return true;
 }
 

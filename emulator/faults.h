@@ -1,0 +1,112 @@
+/* faults: what goes wrong on real rigs, on demand: on the line in both directions, with the axes, with the controller.
+ *
+ * A rule names a fault and says when it strikes: at the next opportunity or the next N, always, by chance, for one command
+ * only, between two instants. Opportunities: an answer (or a streamed frame) begins; a byte of the host arrives; a command
+ * of the host begins; a leg of a move begins. Chance comes from a number that the owner seeds: the same seed and the same
+ * bytes at the same instants give the same faults.
+ *
+ * No OS calls and no clock; the caller owns the struct. The instrument asks, see instrument.c.
+ * Thread-safety: one thread at a time per instrument. */
+#ifndef FAULTS_H
+#define FAULTS_H
+
+#include "dr_controller.h"
+
+typedef enum {
+    FAULT_DROP_BYTE,      /* one byte of an answer, by chance, is lost */
+    FAULT_DELAY_BYTE,     /* ... comes late */
+    FAULT_DUPLICATE_BYTE, /* ... comes twice */
+    FAULT_CORRUPT_BYTE,   /* ... comes with one bit changed */
+    FAULT_DROP_CR,        /* the last byte of an answer is lost */
+    FAULT_LATE_CR,
+    FAULT_STRAY_BYTES,    /* two bytes of chance before an answer */
+    FAULT_SLOW_ANSWER,    /* the whole answer comes late */
+    FAULT_SHORT_FRAME,    /* a streamed frame lacks its last bytes, 1 to 11 by chance */
+    FAULT_TORN_FRAME,     /* a streamed frame pauses in its middle */
+    FAULT_LOSE_HOST_BYTE, /* a byte of the host never arrives */
+    FAULT_IGNORE_STOP,    /* ^C never arrives */
+    FAULT_WEDGE,          /* deaf and mute from this command on, until the power goes */
+    FAULT_STALL_AXIS,     /* an axis gets half of its way only, and nobody is told */
+    FAULT_SLIP_AXIS,      /* an axis' position counts, its tip stays */
+    FAULTS
+} fault_id;
+
+typedef enum {
+    FAULT_OF_ANSWER,
+    FAULT_OF_FRAME,
+    FAULT_OF_HOST_BYTE,
+    FAULT_OF_STOP,
+    FAULT_OF_COMMAND,
+    FAULT_OF_LEG
+} fault_chance;
+
+typedef struct {
+    const char *name;
+    const char *meaning;
+    uint8_t strikes;   /* fault_chance: what it strikes */
+    uint32_t delay_us; /* 0: it does not take a time; else how late, where nothing is said */
+    bool takes_axis;
+} fault_words;
+
+#define FAULT_RULES 32u
+#define FAULT_ALWAYS UINT32_MAX
+#define FAULT_SURE 1000000u
+#define FAULT_BYTES_MAX 3u /* that leave in the place of one */
+
+typedef struct {
+    uint8_t id; /* fault_id */
+    uint8_t op; /* dr_op: only for this command; DR_OP_NONE: any */
+    uint8_t axis;
+    uint32_t left;              /* how often it still strikes; FAULT_ALWAYS */
+    uint32_t chance_millionths; /* FAULT_SURE */
+    uint64_t from_us, until_us; /* between these instants; UINT64_MAX: no end */
+    uint64_t delay_us;
+} fault_rule;
+
+typedef struct {
+    fault_rule rules[FAULT_RULES];
+    uint8_t count;
+    uint64_t random;  /* where chance stands; never 0 */
+    bool has_chanced; /* ... and it has had a say */
+    uint32_t struck;  /* bits 1 << fault_id: since somebody looked */
+
+    /* what has been settled for the answer that is leaving */
+    bool is_answering;
+    uint8_t at, length; /* the byte that comes next, of so many */
+    uint8_t drop_from, drop_to, twice_at, corrupt_at, corrupt_bit, late_at, stray_count; /* UINT8_MAX: no byte */
+    uint64_t late_us;
+
+    bool is_wedged;
+    uint8_t leg_state, leg_number; /* the leg that was seen last */
+    dr_us leg_began;
+    bool slips; /* ... and slips on slip_axis of slip_drive, from slip_from_steps */
+    uint8_t slip_axis, slip_drive;
+    uint32_t slip_from_steps;
+    int64_t slipped_steps[DR_PORTS][DR_AXES]; /* how far positions are ahead of tips */
+} faults;
+
+const fault_words *faults_words(fault_id id);
+bool faults_find(const char *name, fault_id *id);
+
+void faults_init(faults *f, uint64_t seed);
+/* False: there is no room for more rules. */
+bool faults_add(faults *f, const fault_rule *rule);
+/* All rules of a fault; FAULTS: every one. A controller that hangs goes on hanging. */
+void faults_remove(faults *f, fault_id id);
+
+/* -- For the instrument -------------------------------------------------------------------------------------------------- */
+
+static inline bool faults_any(const faults *f) { return f->count > 0 || f->is_answering || f->is_wedged || f->slips; }
+
+/* A byte of an answer is about to get onto the line. Returns until when it waits; now_us or before: it does not. */
+uint64_t faults_hold_us(faults *f, uint64_t now_us, const dr_controller *c);
+/* The byte is through. Returns how many bytes the host gets for it, at out[]. */
+uint8_t faults_byte(faults *f, uint8_t byte, uint8_t out[FAULT_BYTES_MAX]);
+/* A byte of the host is through. False: the controller does not get it. */
+bool faults_host_byte(faults *f, uint64_t now_us, const dr_controller *c, uint8_t byte);
+/* The controller has been called: a leg may have begun or ended, the power may have gone. */
+void faults_look(faults *f, uint64_t now_us, dr_controller *c);
+/* How far the position of an axis, as it is now, is ahead of the tip. */
+int64_t faults_slipped_steps(const faults *f, const dr_controller *c, uint8_t drive, uint8_t axis, dr_us now);
+
+#endif

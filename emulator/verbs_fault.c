@@ -1,0 +1,163 @@
+/* Verbs for faults: what goes wrong, when and how often (faults.h). */
+#include "language.h"
+
+#include "dr_words.h" /* names of commands */
+
+#include <stdio.h>
+#include <string.h>
+
+static faults *faults_of(const telling *t) { return &t->s->ins.faults; }
+
+static bool wrong_name(telling *t, const char *name)
+{
+    char names[WHY_ROOM / 2] = "";
+    size_t length = 0;
+    for (unsigned i = 0; i < FAULTS && length < sizeof names; i++)
+        length += (size_t)snprintf(names + length, sizeof names - length, ", %s", faults_words((fault_id)i)->name);
+    return telling_wrong(t, "'%s': expected off%s", name == NULL ? "" : name, names);
+}
+
+static bool read_number(telling *t, uint32_t *number)
+{
+    char why[WHY_ROOM];
+    unsigned value;
+    const char *const word = telling_next(t);
+    if (!values_number(word == NULL ? "" : word, 1, 1000000, &value, why))
+        return telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
+    *number = value;
+    return true;
+}
+
+static bool read_chance(telling *t, uint32_t *millionths)
+{
+    char why[WHY_ROOM];
+    const char *const word = telling_next(t);
+    return values_millionths(word == NULL ? "" : word, millionths, why) ||
+           telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
+}
+
+static bool read_axis(telling *t, uint8_t *axis)
+{
+    static const char *const names[DR_AXES] = {"x", "y", "z"};
+    for (*axis = 0; *axis < DR_AXES; (*axis)++)
+        if (telling_take(t, names[*axis]))
+            return true;
+    return telling_wrong(t, "'%s': expected an axis: x, y or z", t->words[t->at] == NULL ? "" : t->words[t->at]);
+}
+
+/* When and how often. What is said by chance, or of a span of time, holds always, else once, where nothing is said. */
+static bool read_when(telling *t, fault_rule *r)
+{
+    dr_op op;
+    bool has_count = false, has_limits = false;
+    while (t->words[t->at] != NULL) {
+        bool done;
+        if (telling_take(t, "next")) {
+            has_count = true;
+            r->left = 1;
+            const char *const word = t->words[t->at];
+            done = word == NULL || word[strspn(word, "0123456789")] != '\0' || read_number(t, &r->left);
+        } else if (telling_take(t, "always")) {
+            has_count = done = true;
+            r->left = FAULT_ALWAYS;
+        } else if (telling_take(t, "on")) {
+            if (r->id == FAULT_LOSE_HOST_BYTE)
+                return telling_wrong(t, "a byte that is lost belongs to no command yet: say 'on S fault ...'");
+            done = telling_command(t, &op);
+            r->op = done ? (uint8_t)op : r->op;
+        } else if (telling_take(t, "chance")) {
+            has_limits = true;
+            done = read_chance(t, &r->chance_millionths);
+        } else if (telling_take(t, "from")) {
+            has_limits = true;
+            done = telling_time(t, &r->from_us);
+        } else if (telling_take(t, "until")) {
+            has_limits = true;
+            done = telling_time(t, &r->until_us);
+        } else {
+            return telling_wrong(t, "'%s': expected next, always, on, chance, from or until", t->words[t->at]);
+        }
+        if (!done)
+            return false;
+    }
+    if (!has_count)
+        r->left = has_limits ? FAULT_ALWAYS : 1;
+    return true;
+}
+
+static bool do_fault(telling *t)
+{
+    fault_id id;
+    fault_rule r = {.left = 1, .chance_millionths = FAULT_SURE, .until_us = UINT64_MAX};
+    if (telling_take(t, "off")) {
+        if (!telling_ends(t))
+            return false;
+        faults_remove(faults_of(t), FAULTS);
+        return true;
+    }
+    const char *const name = telling_next(t);
+    if (name == NULL || !faults_find(name, &id))
+        return wrong_name(t, name);
+    if (telling_take(t, "off")) {
+        if (!telling_ends(t))
+            return false;
+        faults_remove(faults_of(t), id);
+        return true;
+    }
+    const fault_words *const words = faults_words(id);
+    r.id = (uint8_t)id;
+    r.delay_us = words->delay_us;
+    if (words->takes_axis && !read_axis(t, &r.axis))
+        return false;
+    const char *const word = t->words[t->at];
+    if (words->delay_us > 0 && word != NULL && strspn(word, "0123456789") > 0 && !telling_time(t, &r.delay_us))
+        return false;
+    if (!read_when(t, &r))
+        return false;
+    return faults_add(faults_of(t), &r) ||
+           telling_wrong(t, "%u rules are all that there is room for; 'fault off' forgets them", FAULT_RULES);
+}
+
+static cJSON *rule_json(const fault_rule *r)
+{
+    cJSON *const out = cJSON_CreateObject();
+    (void)cJSON_AddStringToObject(out, "fault", faults_words((fault_id)r->id)->name);
+    if (r->left != FAULT_ALWAYS)
+        (void)cJSON_AddNumberToObject(out, "left", r->left);
+    if (r->op != DR_OP_NONE)
+        (void)cJSON_AddStringToObject(out, "command", dr_words_command((dr_op)r->op)->name);
+    if (r->chance_millionths < FAULT_SURE)
+        (void)cJSON_AddNumberToObject(out, "chance", r->chance_millionths / 1e6);
+    if (r->from_us > 0)
+        (void)cJSON_AddNumberToObject(out, "from_us", (double)r->from_us);
+    if (r->until_us < UINT64_MAX)
+        (void)cJSON_AddNumberToObject(out, "until_us", (double)r->until_us);
+    if (r->delay_us > 0)
+        (void)cJSON_AddNumberToObject(out, "delay_us", (double)r->delay_us);
+    return out;
+}
+
+static bool do_faults(telling *t)
+{
+    cJSON *const active = cJSON_AddArrayToObject(t->answer, "active");
+    for (uint8_t i = 0; t->s != NULL && i < faults_of(t)->count; i++)
+        (void)cJSON_AddItemToArray(active, rule_json(&faults_of(t)->rules[i]));
+    cJSON *const list = cJSON_AddArrayToObject(t->answer, "faults");
+    for (unsigned i = 0; i < FAULTS; i++) {
+        const fault_words *const words = faults_words((fault_id)i);
+        cJSON *const entry = cJSON_CreateObject();
+        (void)cJSON_AddStringToObject(entry, "fault", words->name);
+        (void)cJSON_AddStringToObject(entry, "does", words->meaning);
+        if (words->delay_us > 0)
+            (void)cJSON_AddNumberToObject(entry, "delay_us", words->delay_us);
+        (void)cJSON_AddBoolToObject(entry, "takes_axis", words->takes_axis);
+        (void)cJSON_AddItemToArray(list, entry);
+    }
+    return telling_ends(t);
+}
+
+const verb verbs_fault[] = {
+    {"fault", "NAME [AXIS|DELAY] [next [N]|always] [on S] [chance P] [from TIME] [until TIME] | [NAME] off",
+     "something goes wrong: once, where nothing else is said", true, do_fault},
+    {"faults", "", "list what can go wrong, and what is about to", false, do_faults},
+    {NULL, NULL, NULL, false, NULL}};
