@@ -185,7 +185,7 @@ class Usage(unittest.TestCase):
         status, out, err = run("--help")
         self.assertEqual((0, ""), (status, err))
         commands = re.findall(r"^  ([a-z]+)[ \n]", out.split("Options")[0], re.M)
-        self.assertEqual(13, len(commands))
+        self.assertEqual(14, len(commands))
         for command in commands:
             status, text, _ = run(command, "--help")
             self.assertEqual((0, True), (status, f"[OPTIONS] {command}" in text))
