@@ -1,8 +1,10 @@
+#define _POSIX_C_SOURCE 200809L /* poll, fileno */
 #include "trace.h"
 
 #include "dr_words.h" /* dr_words_note */
 
 #include <errno.h>
+#include <poll.h>
 #include <string.h>
 
 #define TEXT 512
@@ -34,10 +36,15 @@ static void give_up(trace *t)
     t->file = NULL;
 }
 
-static void tell(trace *t, const char *name, uint64_t when_us, char direction, const char *hex, const char *text)
+/* A pipe or a terminal that has room for anything has room for a line. */
+static bool has_room(const trace *t)
 {
-    if (t->file == NULL)
-        return;
+    struct pollfd file = {.fd = fileno(t->file), .events = POLLOUT};
+    return poll(&file, 1, 0) != 0;
+}
+
+static void put(trace *t, const char *name, uint64_t when_us, char direction, const char *hex, const char *text)
+{
     const unsigned long long seconds = when_us / DR_US_PER_S;
     const unsigned micros = (unsigned)(when_us % DR_US_PER_S);
     const int width = hex[0] == '\0' ? 0 : HEX_WIDTH;
@@ -46,6 +53,23 @@ static void tell(trace *t, const char *name, uint64_t when_us, char direction, c
                              width > 0 ? " " : "", text);
     if (named < 0 || done < 0)
         give_up(t);
+}
+
+/* Who starts a trace and does not read it does not hold the controller up, and can still end the emulator. */
+static void tell(trace *t, const char *name, uint64_t when_us, char direction, const char *hex, const char *text)
+{
+    if (t->file != NULL && t->lost > 0 && has_room(t)) {
+        char lost[TEXT];
+        (void)snprintf(lost, sizeof lost, "%u lines of the trace are lost, nobody took them", (unsigned)t->lost);
+        t->lost = 0;
+        put(t, name, when_us, '-', "", lost);
+    }
+    if (t->file == NULL)
+        return;
+    if (has_room(t))
+        put(t, name, when_us, direction, hex, text);
+    else
+        t->lost++;
 }
 
 static size_t add_hex(char *hex, size_t at, const uint8_t *bytes, size_t count)

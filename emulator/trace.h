@@ -24,6 +24,7 @@ typedef struct {
     const instrument *streaming; /* whose they are */
     const char *streaming_name;
     uint32_t streamed_count;
+    uint32_t lost; /* lines that nobody took, since one was */
 } trace;
 
 /* Opens a file, or stderr where path is "-". False: errno says why. */
