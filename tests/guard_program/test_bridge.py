@@ -261,6 +261,34 @@ class Orders(unittest.TestCase):
         self.assertIn("Does a guard run with --control there?", err)
 
 
+class SerialPort(unittest.TestCase):
+    """The way to a real port, by libserialport, on a pseudo-terminal that is made to look like one."""
+
+    @staticmethod
+    def env(port):
+        asan = os.environ.get("ASAN_OPTIONS", "")
+        return {**os.environ, "LD_PRELOAD": os.environ["DRYRIG_SHIM"], "DRYRIG_SHIM_PTY": port,
+                "ASAN_OPTIONS": f"{asan}:verify_asan_link_order=0"}
+
+    def test_a_move_through_it_and_the_port_lost(self):
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST) as e:
+            with Guard(directory, "/dev/ttyEMU0", rig(guard.MPC), env=self.env(e.path)) as g, emu.Port(g.path) as port:
+                g.arm()
+                self.assertEqual(port.ask(line(15, 30, 40, 50), 1), b"\r")
+                self.assertEqual(position_mpc(port.ask(b"C", 14)), (30, 40, 50))
+                e.stop()
+                g.wait_for("locked")
+                self.assertIn("/dev/ttyEMU0: it is gone", g.status()["device_says"])
+
+    def test_a_converter_with_another_number_is_not_taken(self):
+        config = rig(guard.MPC, more='converter_serial = "FT123";')
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST) as e:
+            for port, env in (("/dev/ttyEMU0", self.env(e.path)), (e.path, None)):
+                with Guard(directory, port, config, wait="locked", env=env) as g:
+                    self.assertIn("the configuration is for FT123", g.status()["device_says"])
+                    self.assertEqual(g.order("arm")["ok"], False)
+
+
 class Log(unittest.TestCase):
     def test_it_is_whole_and_tampering_shows(self):
         with guarded("mpc", rig(guard.MPC, high=1000), *FAST) as (_, g, port):
