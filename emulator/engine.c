@@ -161,6 +161,7 @@ static void listen_to(engine *e, station *s)
     while (station_read(s)) {
         const bool has_more = s->chunk_is_full; /* if not, the kernel will say when it has */
         read_hints(e);                          /* see station_take() */
+        e->now_ns = real_ns();                  /* not before it was written: pauses never look shorter for that */
         station_take(s, e->now_us, e->now_ns);
         if (!has_more)
             return;
