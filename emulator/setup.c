@@ -197,11 +197,14 @@ bool setup_read(const setup_text *t, bool is_paced_by_default, setup *o, setup_p
     at(problem, "controller", 0, t->controller);
     if (!dr_words_kind_find(t->controller, &o->kind))
         return wrong(problem, "expected trio or mpc");
-    o->firmware = o->kind == DR_TRIO ? DR_FIRMWARE_TRIO : DR_FIRMWARE_MPC;
+    const uint16_t newest = o->kind == DR_TRIO ? DR_FIRMWARE_TRIO : DR_FIRMWARE_MPC;
+    o->firmware = newest;
     at(problem, "firmware", 0, t->firmware);
     const char *const bad = t->firmware == NULL ? NULL : dr_words_firmware_parse(t->firmware, &o->firmware);
     if (bad != NULL)
         return wrong(problem, "%s", bad);
+    if (o->firmware > newest) /* what it would do, nobody here knows */
+        return wrong(problem, "the manual tells of 1.00 to %x.%02x", newest >> 8u, newest & 0xFFu);
     if (!read_devices(o, t, problem) || !read_points(o, t, problem) || !read_angle(o, t->angle, problem) ||
         !read_quirks(o, t->quirks == NULL ? "" : t->quirks, problem))
         return false;

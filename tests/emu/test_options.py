@@ -112,6 +112,8 @@ class Wrong(unittest.TestCase):
     def test_firmware(self):
         for text in ("3", "3.2", "three", "3.211", "", "0.99", "3,21"):
             self.refused(["mpc", "--firmware", text], "--firmware")
+        self.refused(["mpc", "--firmware", "3.22"], "1.00 to 3.21")
+        self.refused(["trio", "--firmware", "3.21"], "1.00 to 3.12")
 
     def test_positions(self):
         for text in ("1,2", "1,2,3,4", "1,2,", "a,b,c", "1;2;3", "-1,0,0", "1.5,0,0", "0x10,0,0", "1um,2,3", "99999999999,0,0", "", "1,2,3mm"):
