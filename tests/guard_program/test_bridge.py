@@ -324,6 +324,7 @@ class Log(unittest.TestCase):
                 answer = g.order("arm")
                 self.assertEqual((answer["ok"], [need["need"] for need in answer["needs"]]), (False, ["log"]))
                 self.assertIn("cannot be written", g.err())
+            self.assertEqual(guard.run("log", g.log)[0], 4) # the last line is cut off, and that shows
 
 
 class Rest(unittest.TestCase):

@@ -57,7 +57,7 @@ static void keep_records(bridge *b)
     bool is_kept = true;
     while (dr_guard_pull_log(&b->guard, &record)) {
         const uint64_t ago_us = (uint32_t)(bridge_now(b) - record.when);
-        is_kept = journal_add(&b->journal, &b->rig, &record, clock_us(CLOCK_REALTIME) - ago_us);
+        is_kept = journal_add(&b->journal, &b->rig, &record, clock_us(CLOCK_REALTIME) - ago_us) && is_kept;
     }
     if (!is_kept && !b->log_said)
         (void)fprintf(stderr, "dryrig-guard: the log %s cannot be written: %s\n", b->options->log, strerror(errno));
