@@ -962,7 +962,7 @@ size_t dr_words_note(char *out, size_t room, const dr_words_context *context, co
         add(&t, "%s is over and its CR will not come", command);
         break;
     case DR_NOTE_CLIPPED:
-        add(&t, "the target of %c is beyond the travel and was cut to its end", axis_of(note->value));
+        add(&t, "the target of %c is beyond the travel", axis_of(note->value));
         break;
     case DR_NOTE_SPEED_CUT:
         add(&t, "a speed above 15 counts by its low four bits: %u", (unsigned)note->value);

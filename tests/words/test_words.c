@@ -352,7 +352,7 @@ static void test_notes(void)
     NOTES("has arrived at X 0.0 um (0 steps), Y 0.0 um (0), Z 0.0 um (0)", trio, .what = DR_NOTE_ARRIVED);
     NOTES("drive 1 was stopped at X 0.0625 um (1 step), Y 0.0 um (0), Z 0.0 um (0)", mpc, .what = DR_NOTE_STOPPED,
           .steps = {1, 0, 0});
-    NOTES("the target of Y is beyond the travel and was cut to its end", mpc, .what = DR_NOTE_CLIPPED, .value = DR_Y);
+    NOTES("the target of Y is beyond the travel", mpc, .what = DR_NOTE_CLIPPED, .value = DR_Y);
     NOTES("X does not move at an angle of 90 degrees", trio, .what = DR_NOTE_AXIS_STANDS, .value = DR_X);
     NOTES("Z does not move at an angle of 0 degrees", trio, .what = DR_NOTE_AXIS_STANDS, .value = DR_Z);
     NOTES("0x5B '[' is out of range for angle and changes nothing", trio, .what = DR_NOTE_BAD_VALUE,
