@@ -186,6 +186,17 @@ static void tell_difference(const actor *a)
                  a->recorded.count, a->replayed.count);
 }
 
+/* Behind a difference: what is still to come belongs to it. */
+static void go_on_afresh(actor *a)
+{
+    const uint64_t began_us = a->ins.now_us;
+    uint64_t due_us;
+    while (instrument_due(&a->ins, &due_us)) /* moves end */
+        run_to(a, due_us);
+    a->shift_us += a->ins.now_us - began_us;
+    a->replayed.count = 0;
+}
+
 /* What came between two writes of the host. What comes here before it came in the recording is kept for the next time. */
 static void compare(actor *a, bool is_last)
 {
@@ -199,7 +210,7 @@ static void compare(actor *a, bool is_last)
     if (was->count != compared || memcmp(was->bytes, is->bytes, kept) != 0) {
         a->differences++;
         tell_difference(a);
-        is->count = 0; /* what is left of them belongs to nothing */
+        go_on_afresh(a);
     } else {
         const int64_t drift_us = (int64_t)(is->last_us - a->shift_us) - (int64_t)was->last_us;
         if (!comes_early && llabs(drift_us) > llabs(a->drift_us))

@@ -5,6 +5,7 @@
 #include "decode.h"
 #include "options.h"
 #include "print.h"
+#include "record.h"
 
 #include <signal.h>
 #include <stdio.h>
@@ -160,7 +161,7 @@ static int exit_status(int result)
 
 int main(int argc, char **argv)
 {
-    const command_line line = read_command_line(argc, argv);
+    command_line line = read_command_line(argc, argv);
     const command_id id = line.command->id;
     if (id == CMD_PORTS)
         return print_ports(&line);
@@ -179,7 +180,15 @@ int main(int argc, char **argv)
     catch_signals();
     dryrig *d;
     char why[DRYRIG_WHY_MAX];
-    int result = dryrig_open(&d, &line.open, why, sizeof why);
+    record recorder;
+    dryrig_link recorded;
+    int result = DRYRIG_OK;
+    if (line.record != NULL) {
+        result = record_open(&recorder, &line, &recorded, why, sizeof why);
+        line.open.link = &recorded;
+    }
+    if (result == DRYRIG_OK)
+        result = dryrig_open(&d, &line.open, why, sizeof why);
     if (result != DRYRIG_OK) {
         print_error(&line, result, why, NULL);
         return exit_status(result);

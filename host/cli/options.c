@@ -60,6 +60,7 @@ static const char options_help[] =
     "      --json               results as JSON, one object a line\n"
     "      --firmware X.YY      the firmware, where the controller cannot tell: TRIO, MPC-200 below 3.00\n"
     "      --baud N             the baud rate (57600 or 128000)\n"
+    "      --record FILE        write the bytes of both directions, with times, to FILE ('decode' explains it)\n"
     "  -h, --help               this, or help on the command\n"
     "  -V, --version\n";
 
@@ -156,7 +157,7 @@ static bool is_number(const char *text)
     return text[0] == '-' && (isdigit((unsigned char)text[1]) || (text[1] == '.' && isdigit((unsigned char)text[2])));
 }
 
-enum { OPT_STEPS = 256, OPT_JSON, OPT_FIRMWARE, OPT_BAUD, OPT_SPEED, OPT_STREAM, OPT_ORDER };
+enum { OPT_STEPS = 256, OPT_JSON, OPT_FIRMWARE, OPT_BAUD, OPT_SPEED, OPT_STREAM, OPT_ORDER, OPT_RECORD };
 
 static const struct option long_options[] = {
     {"port", required_argument, NULL, 'p'},
@@ -169,6 +170,7 @@ static const struct option long_options[] = {
     {"speed", required_argument, NULL, OPT_SPEED},
     {"stream", no_argument, NULL, OPT_STREAM},
     {"order", required_argument, NULL, OPT_ORDER},
+    {"record", required_argument, NULL, OPT_RECORD},
     {"help", no_argument, NULL, 'h'},
     {"version", no_argument, NULL, 'V'},
     {NULL, 0, NULL, 0},
@@ -215,6 +217,9 @@ static void take_option(int option, raw_options *raw, command_line *line)
         break;
     case OPT_ORDER:
         raw->order = optarg;
+        break;
+    case OPT_RECORD:
+        line->record = optarg;
         break;
     case 'h':
         raw->help = true;
@@ -355,6 +360,8 @@ command_line read_command_line(int argc, char **argv)
             help_on_all();
         exit(EXIT_DONE);
     }
+    if (line.record != NULL && (line.command->id == CMD_DECODE || line.command->id == CMD_PORTS))
+        usage_error(line.command, "--record: %s has nothing to record", line.command->name);
     if (line.command->id == CMD_DECODE)
         set_decode_options(&raw, &line);
     else if (line.command->id != CMD_PORTS)

@@ -36,6 +36,7 @@ typedef struct {
     dryrig_options open;
     const command_row *command;
     const char *argument[3];
+    const char *record; /* NULL: nothing is recorded */
     bool has_stage, has_controller;
     bool steps, json, stream;
     int speed;

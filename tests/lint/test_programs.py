@@ -148,6 +148,24 @@ class Recordings(unittest.TestCase):
         self.assertIn("replayed:  AB 29 00 00", out)
         self.assertRegex(out, r"trio: 1 of \d\d+ answers differ; the others came when recorded")
 
+    def test_the_command_line_records_at_its_own_end(self):
+        status, _, err = emulator("run", "mpc", "--device", "MP-225", "--", DRYRIG, "-c", "mpc", "-s", "MP-225",
+                                  "--record", self.path, "line", "10", "20", "30", "--speed", "5", "--stream")
+        self.assertEqual((0, ""), (status, err))
+        status, out, _ = emulator("replay", self.path)
+        self.assertEqual(0, status, out)
+        self.assertRegex(out, r"mpc: 0 of \d\d answers differ; they came up to \d+ us (earlier|later) than recorded")
+
+    def test_behind_a_difference_the_rest_is_compared_afresh(self):
+        self.record("mpc", "--clock", "jump", "--work", "160,160,160")
+        with open(self.path, encoding="ascii") as file:
+            text = file.read()
+        with open(self.path, "w", encoding="ascii") as file:  # other positions are streamed, for longer
+            file.write(text.replace("set mpc position 0,0,0\n", "set mpc position 16,0,90000\n", 1))
+        status, out, _ = emulator("replay", self.path)
+        self.assertEqual(1, status)
+        self.assertRegex(out, r"mpc: [2-6] of \d\d answers differ")
+
     def test_what_is_no_recording(self):
         for text, wanted in (("", "line.rec:0: it is empty"), ("\x7fELF\n", "line.rec:1: it is no recording"),
                              ("dryrig-recording 1\n0.000000 0.000000 a > 43\n", "line.rec:2: which controller?"),
