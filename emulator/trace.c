@@ -1,6 +1,8 @@
 #define _POSIX_C_SOURCE 200809L /* poll, fileno */
 #include "trace.h"
 
+#include "observe_json.h" /* for programs */
+
 #include "dr_words.h" /* dr_words_note */
 
 #include <errno.h>
@@ -8,6 +10,7 @@
 #include <string.h>
 
 #define TEXT 512
+#define JSON_LINES ".jsonl"
 #define HEX_WIDTH ((int)(3u * DR_FRAME_MAX))
 
 static void see(observer *o, const observation *seen);
@@ -23,6 +26,8 @@ bool trace_open(trace *t, const char *path, bool has_names)
         return false;
     (void)setvbuf(t->file, NULL, _IOLBF, BUFSIZ);
     t->is_on = true;
+    t->is_json =
+        strlen(path) >= strlen(JSON_LINES) && strcmp(path + strlen(path) - strlen(JSON_LINES), JSON_LINES) == 0;
     t->has_names = has_names;
     return true;
 }
@@ -129,11 +134,25 @@ static void tell_note(trace *t, const observation *seen)
     tell(t, seen->name, seen->when_us, direction, hex, text);
 }
 
+static void tell_json(trace *t, const observation *seen)
+{
+    cJSON *const object = observe_json(seen);
+    char *const text = cJSON_PrintUnformatted(object);
+    if (text == NULL || fprintf(t->file, "%s\n", text) < 0)
+        give_up(t);
+    cJSON_free(text);
+    cJSON_Delete(object);
+}
+
 static void see(observer *o, const observation *seen)
 {
     trace *const t = (trace *)o;
     if (t->file == NULL || !t->is_on)
         return;
+    if (t->is_json) {
+        tell_json(t, seen);
+        return;
+    }
     const bool is_note = seen->what == OBSERVED_NOTE;
     if (is_note && seen->note->what == DR_NOTE_STREAM) {
         if (t->streaming != seen->ins)

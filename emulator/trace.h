@@ -18,6 +18,7 @@ typedef struct {
     FILE *file;
     const char *path; /* for messages */
     bool is_on;       /* as opened, and `trace on`, `trace off` */
+    bool is_json;     /* an object a line, as `subscribe` sends them */
     bool has_names;   /* a line begins with the station's name */
     dr_note streamed; /* the last of the group of streamed positions that is under way */
     uint64_t streamed_us;
@@ -27,7 +28,7 @@ typedef struct {
     uint32_t lost; /* lines that nobody took, since one was */
 } trace;
 
-/* Opens a file, or stderr where path is "-". False: errno says why. */
+/* Opens a file, or stderr where path is "-"; one whose name ends in .jsonl gets JSON lines. False: errno says why. */
 bool trace_open(trace *t, const char *path, bool has_names);
 void trace_close(trace *t);
 

@@ -100,6 +100,20 @@ class Lint(unittest.TestCase):
             self.assertEqual(wanted, "wrong-baud" in err, err)
 
 
+class Trace(unittest.TestCase):
+    def test_json_lines(self):
+        with tempfile.TemporaryDirectory() as where:
+            path = os.path.join(where, "trace.jsonl")
+            status, _, err = emulator("run", "trio", "--trace", path, "--", "sh", "-c",
+                                      "exec 3<>$DRYRIG_PORT; printf c >&3; dd bs=14 count=1 iflag=fullblock <&3 2>&1 >/dev/null")
+            self.assertEqual(0, status, err)
+            with open(path, encoding="utf-8") as file:
+                lines = [json.loads(line) for line in file]
+        requests = [line for line in lines if line.get("note") == "request"]
+        self.assertEqual(["63"], [line["bytes"] for line in requests])
+        self.assertEqual("position", requests[0]["command"])
+
+
 class Recordings(unittest.TestCase):
     def setUp(self):
         self.where = tempfile.TemporaryDirectory()
