@@ -323,7 +323,7 @@ void engine_catch_up(engine *e)
 
 void engine_advance(engine *e, uint64_t until_us, bool until_idle)
 {
-    uint64_t when_us;
+    uint64_t when_us = 0;
     engine_catch_up(e);
     while (due(e, !until_idle, &when_us) && when_us <= until_us) {
         if (when_us > e->now_us)

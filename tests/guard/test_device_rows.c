@@ -35,7 +35,9 @@ static void fake_at(uint32_t *steps)
 
 static void fake_rest(void)
 {
-    fake_at(fake.at);
+    uint32_t steps[3];
+    fake_at(steps);
+    memcpy(fake.at, steps, sizeof steps);
     fake.moves = false;
 }
 

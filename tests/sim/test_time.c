@@ -97,7 +97,7 @@ static void play(dr_kind kind, uint64_t session, bool fidget)
         for (size_t k = 1; k <= args; k++) {
             frame[k] = args == 1 ? (uint8_t)(1 + any(4)) : args == 13 && k == 1 ? (uint8_t)(12 + any(4)) : 0;
         }
-        for (size_t k = args == 13 ? 2 : 1; args > 1 && k <= args; k += 4) {
+        for (size_t k = args == 13 ? 2 : 1; k < args && k + 1 < sizeof frame; k += 4) {
             frame[k] = (uint8_t)any(256);
             frame[k + 1] = (uint8_t)any(3);
         }
