@@ -118,15 +118,15 @@ static bool hold_down(telling *t, int button, const char *name, uint64_t span_us
 
 static bool do_press(telling *t)
 {
-    int button;
-    const char *name;
+    int button = 0;
+    const char *name = "";
     return read_control(t, buttons, &button, &name) && telling_ends(t) && hold_down(t, button, name, PRESS_US);
 }
 
 static bool do_hold(telling *t)
 {
-    int button;
-    const char *name;
+    int button = 0;
+    const char *name = "";
     uint64_t span_us;
     return read_control(t, buttons, &button, &name) && telling_time(t, &span_us) && telling_ends(t) &&
            hold_down(t, button, name, span_us);
@@ -134,9 +134,9 @@ static bool do_hold(telling *t)
 
 static bool do_knob(telling *t)
 {
-    int knob;
-    const char *name;
-    unsigned detents;
+    int knob = 0;
+    const char *name = "";
+    unsigned detents = 0;
     if (!read_control(t, knobs, &knob, &name))
         return false;
     const char *const word = t->words[t->at];
@@ -165,10 +165,10 @@ static unsigned switches_in(const telling *t, int bank)
 
 static bool do_switch(telling *t)
 {
-    int bank;
-    const char *name;
+    int bank = 0;
+    const char *name = "";
     instrument *const ins = ins_of(t);
-    unsigned device = ins->controller.active + 1u, number;
+    unsigned device = ins->controller.active + 1u, number = 0;
     if (!read_control(t, banks, &bank, &name))
         return false;
     const bool is_of_device = kind_of(t) == DR_MPC && bank != DR_SWITCHES_ROE;
