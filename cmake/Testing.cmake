@@ -10,7 +10,7 @@ set(DRYRIG_TEST_ENVIRONMENT
 
 # dr_test(NAME SOURCES FILE... [LIBS TARGET...] [ARGS ARG...] [LABELS LABEL...] [TIMEOUT SECONDS])
 #   A Unity test program of that name, and a test of that name that runs it. Unity is linked; LIBS are what is tested.
-#   The name of the directory is always a label. A test may take 60 s, where nothing else is said.
+#   The name of the directory is always a label. A test may take 300 s, where nothing else is said: many times what any needs, as machines are busy.
 function(dr_test name)
   cmake_parse_arguments(PARSE_ARGV 1 test "" "TIMEOUT" "SOURCES;LIBS;ARGS;LABELS")
   if(NOT test_SOURCES OR test_UNPARSED_ARGUMENTS)
@@ -38,7 +38,7 @@ endfunction()
 function(dr_test_properties name)
   cmake_parse_arguments(PARSE_ARGV 1 test "" "TIMEOUT" "LABELS;ENVIRONMENT")
   if(NOT test_TIMEOUT)
-    set(test_TIMEOUT 60)
+    set(test_TIMEOUT 300)
   endif()
   get_filename_component(directory "${CMAKE_CURRENT_SOURCE_DIR}" NAME)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${test_TIMEOUT} LABELS "${directory};${test_LABELS}"

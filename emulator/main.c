@@ -219,6 +219,8 @@ static void set_environment(const program *p)
         (void)setenv(p->o->rig_file == NULL ? "DRYRIG_PORT" : variable, s->link, 1);
     }
     (void)setenv("DRYRIG_CONTROL", p->o->control, 1);
+    if (p->o->clock != CLOCK_REAL || p->o->speedup > 1)
+        (void)setenv("DRYRIG_FAST", "1", 1); /* dryrig then believes moves that end before their time */
 }
 
 /* -- From beginning to end ----------------------------------------------------------------------------------------------- */

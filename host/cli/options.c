@@ -60,6 +60,7 @@ static const char options_help[] =
     "      --json               results as JSON, one object a line\n"
     "      --firmware X.YY      the firmware, where the controller cannot tell: TRIO, MPC-200 below 3.00\n"
     "      --baud N             the baud rate (57600 or 128000)\n"
+    "      --fast               the controller is emulated, faster than real time (or: $DRYRIG_FAST is set)\n"
     "      --record FILE        write the bytes of both directions, with times, to FILE ('decode' explains it)\n"
     "  -h, --help               this, or help on the command\n"
     "  -V, --version\n";
@@ -157,7 +158,7 @@ static bool is_number(const char *text)
     return text[0] == '-' && (isdigit((unsigned char)text[1]) || (text[1] == '.' && isdigit((unsigned char)text[2])));
 }
 
-enum { OPT_STEPS = 256, OPT_JSON, OPT_FIRMWARE, OPT_BAUD, OPT_SPEED, OPT_STREAM, OPT_ORDER, OPT_RECORD };
+enum { OPT_STEPS = 256, OPT_JSON, OPT_FIRMWARE, OPT_BAUD, OPT_SPEED, OPT_STREAM, OPT_ORDER, OPT_RECORD, OPT_FAST };
 
 static const struct option long_options[] = {
     {"port", required_argument, NULL, 'p'},
@@ -167,6 +168,7 @@ static const struct option long_options[] = {
     {"json", no_argument, NULL, OPT_JSON},
     {"firmware", required_argument, NULL, OPT_FIRMWARE},
     {"baud", required_argument, NULL, OPT_BAUD},
+    {"fast", no_argument, NULL, OPT_FAST},
     {"speed", required_argument, NULL, OPT_SPEED},
     {"stream", no_argument, NULL, OPT_STREAM},
     {"order", required_argument, NULL, OPT_ORDER},
@@ -180,7 +182,7 @@ static const struct option long_options[] = {
 typedef struct {
     const char *port, *controller, *stage[DRYRIG_DRIVES], *firmware, *baud, *speed, *order;
     int stage_count;
-    bool help;
+    bool fast, help;
 } raw_options;
 
 static void take_option(int option, raw_options *raw, command_line *line)
@@ -205,6 +207,9 @@ static void take_option(int option, raw_options *raw, command_line *line)
         break;
     case OPT_FIRMWARE:
         raw->firmware = optarg;
+        break;
+    case OPT_FAST:
+        raw->fast = true;
         break;
     case OPT_BAUD:
         raw->baud = optarg;
@@ -321,6 +326,7 @@ static void set_options(const raw_options *raw, command_line *line)
     if (raw->controller == NULL)
         usage_error(command, "--controller is missing: trio or mpc");
     set_controller(raw, line);
+    line->open.is_fast = raw->fast || getenv("DRYRIG_FAST") != NULL;
     line->open.port = raw->port != NULL ? raw->port : getenv("DRYRIG_PORT");
     if (line->open.port == NULL)
         usage_error(command, "--port is missing, and DRYRIG_PORT is not set; 'dryrig ports' lists the serial ports");

@@ -126,6 +126,7 @@ static int set_up(dryrig *d, const dryrig_options *options)
     d->grace_us = (uint64_t)options->grace_ms * MS_US;
     d->answer_us = options->answer_ms * MS_US;
     d->ask_once = options->ask_once;
+    d->is_fast = options->is_fast;
     d->doubt = DOUBT_LATE; /* whoever talked to the controller before may not have heard it out */
     d->streaming = -1;
     return DRYRIG_OK;

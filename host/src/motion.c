@@ -337,7 +337,8 @@ static int run(dryrig *d, const plan *p, dryrig_position *end)
         has_ended = has_ended || result > TIME_UP;
         if (result == TIME_UP && (!unsure || now_us(d) >= limit_us))
             return overdue(d, p, &w, end);
-        if (result == ENDED && w.stops == 0 && (double)(now_us(d) - w.began_us) < early * p->shortest_us) {
+        if (result == ENDED && w.stops == 0 && !d->is_fast &&
+            (double)(now_us(d) - w.began_us) < early * p->shortest_us) {
             const uint64_t over_us = w.began_us + (uint64_t)p->longest_us + QUIET_US,
                            wait_us = now_us(d) + EARLY_WAIT_US;
             result = wait_for_end(d, p, &w, over_us < wait_us ? over_us : wait_us);

@@ -39,6 +39,7 @@ struct dryrig {
     uint64_t grace_us;
     uint32_t answer_us;
     bool ask_once;
+    bool is_fast;
 
     doubt doubt;
     uint64_t busy_us;       /* when the last byte went or came */

@@ -588,6 +588,9 @@ static void stray_cr(core_link *l)
 
 /* 20,000 steps take 416,667 us. A CR long before is not believed, and nothing is asked while it moves; one shortly before
  * is looked into. Either way the end is the true one. */
+/* As if its clock had leapt. */
+static void there_at_once(core_link *l) { l->ins.controller.leg_began -= dr_leg_lasts_us(&l->ins.controller.leg); }
+
 static void a_stray_cr_does_not_end_a_move(void)
 {
     const int32_t target[3] = {20000, 0, 0};
@@ -604,6 +607,31 @@ static void a_stray_cr_does_not_end_a_move(void)
         check_in_step();
         tearDown();
     }
+}
+
+/* An emulator may be faster than real time: then a CR ends a move, however early, and asking at once shows that it does. */
+static void a_fast_controller_is_believed(void)
+{
+    const int32_t target[3] = {400000, 0, 0};
+    uint64_t took_us[2];
+    for (int fast = 0; fast < 2; fast++) {
+        dryrig_options options = dryrig_defaults(DRYRIG_MPC);
+        options.is_fast = fast;
+        core_link_init(link, DR_MPC);
+        core_link_start(link);
+        d = core_link_open(link, &options);
+        dryrig_position p;
+        OK(dryrig_get_position(d, &p));
+        link->event_us = link->now_us + 100000; /* of the 8.3 s that the move takes */
+        link->event = there_at_once;
+        const uint64_t began_us = link->now_us;
+        OK(dryrig_move_steps(d, target, DRYRIG_ORDER_AUTO, &p));
+        check_at(&p, 400000, 0, 0);
+        took_us[fast] = link->now_us - began_us;
+        check_in_step();
+        tearDown();
+    }
+    TEST_ASSERT_TRUE(took_us[0] > 1000000 && took_us[1] < 500000);
 }
 
 /* Some firmware resumes a stopped move in place of the next one. */
@@ -932,6 +960,7 @@ int main(void)
     RUN_TEST(position_13_is_told_from_a_loss);
     RUN_TEST(a_unit_that_boots);
     RUN_TEST(a_stray_cr_does_not_end_a_move);
+    RUN_TEST(a_fast_controller_is_believed);
     RUN_TEST(pause_on_stop_is_noticed);
     RUN_TEST(stop_on_the_roe_that_says_i);
     RUN_TEST(another_drive_was_selected_by_hand);

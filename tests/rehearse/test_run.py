@@ -39,6 +39,11 @@ class Run(unittest.TestCase):
         done = self.run_("mpc", "--", sys.executable, "-c", HOST)
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, b"\x01\x21\x03\r", b""))
 
+    def test_the_command_is_told_of_a_fast_clock(self):
+        for options, told in ((), b"-"), (("--clock", "jump"), b"1"), (("--clock", "step"), b"1"), (("--speedup", "9"), b"1"):
+            done = self.run_(*options, "trio", "--", "sh", "-c", 'printf "${DRYRIG_FAST:--}"')
+            self.assertEqual(done.stdout, told)
+
     def test_its_exit_status_is_ours(self):
         for status in (0, 1, 3, 77, 125, 255):
             self.assertEqual(self.run_("trio", "--", "sh", "-c", f"exit {status}").returncode, status)

@@ -160,6 +160,7 @@ typedef struct {
     unsigned grace_ms;  /* and so much longer; 2000 */
     unsigned answer_ms; /* time limit of a query's or a setting's answer; 1000 */
     bool ask_once;      /* believe a query's first answer: half the time, no protection from a flipped bit */
+    bool is_fast;       /* believe a CR however early: for an emulator whose clock runs faster than real time */
 } dryrig_options;
 
 DRYRIG_API dryrig_options dryrig_defaults(dryrig_controller controller);
