@@ -249,6 +249,7 @@ class Killed(unittest.TestCase):
                 self.start_move()
                 self.guard.kill()
                 self.emulator.stop(signal.SIGKILL)
+                os.unlink(self.device_link) # its /dev/pts/N may be another test's by now
                 if device_first:
                     self.restart_device()
                     self.guard.start()
