@@ -41,7 +41,8 @@ class Readme(unittest.TestCase):
         return os.path.join(self.directory.name, name)
 
     def here(self, text):
-        return text.replace("/tmp/mpc", self.path("mpc")).replace("/tmp/trio", self.path("trio")).replace("$PWD/build", BUILD)
+        text = text.replace("/tmp/mpc", self.path("mpc")).replace("/tmp/trio", self.path("trio")).replace("$PWD/build", BUILD)
+        return re.sub(r"(?<![\w/])build/", f"{BUILD}/", text)
 
     def run_here(self, *command):
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=self.directory.name)
@@ -72,6 +73,7 @@ class Words(unittest.TestCase):
 
     def test_options_exist(self):
         programs = [f"{BUILD}/emulator/dryrig-emu", f"{BUILD}/host/dryrig"]
+        programs.append(f"{BUILD}/emulator/dryrig-panel")
         known = "".join(subprocess.run([p, "--help"], capture_output=True, text=True, check=True).stdout for p in programs)
         others = {"--build", "--install", "--cflags", "--libs"}  # of CMake and pkg-config
         for option in set(re.findall(r"(?<![\w-])--[a-z]+", README)) - others:
