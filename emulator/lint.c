@@ -246,7 +246,7 @@ static void judge_contents(lint *l, lint_station *s, const observation *seen, co
                  value);
         break;
     case DR_OP_MPC_LINE:
-        if (s->pause_us < DR_PAUSE_IN_LINE_US)
+        if ((uint64_t)s->pause_us + s->late_us < DR_PAUSE_IN_LINE_US)
             find(l, s, seen, LINT_NO_PAUSE_IN_S, bytes, count, "%lu.%01lu ms of pause within it",
                  (unsigned long)s->pause_us / 1000u, (unsigned long)s->pause_us / 100u % 10u);
         if (!s->said_streaming && !s->told_streaming) {
@@ -328,7 +328,7 @@ static void judge_turn(lint *l, const lint_station *s, const observation *seen, 
         find(l, s, seen, LINT_UNREAD_REPLY, bytes, count, "%lu byte%s unread, the last answer was that to %s",
              (unsigned long)s->unread, s->unread == 1 ? " was" : "s were", before);
     const uint64_t pause_us = us_between(s->reply_ns > s->command_ns ? s->reply_ns : s->command_ns, s->began_ns);
-    if (pause_us < LINT_PAUSE_US && s->unread == 0) /* one that did not read has no pause to make */
+    if (pause_us + s->late_us < LINT_PAUSE_US && s->unread == 0) /* one that did not read has no pause to make */
         find(l, s, seen, LINT_HURRIED_COMMAND, bytes, count, "%llu.%llu ms after the answer to %s",
              (unsigned long long)pause_us / 1000u, (unsigned long long)pause_us / 100u % 10u, before);
 }
@@ -408,9 +408,11 @@ static void bytes_from_host(lint *l, lint_station *s, const observation *seen)
         if (s->framer.have == 0) {
             s->began_ns = seen->real_ns;
             s->pause_us = 0;
+            s->late_us = i == 0 ? seen->late_us : 0;
             s->unread = i == 0 ? seen->unread : 0;
         } else if (i == 0) {
             s->pause_us = seen->pause_us > UINT32_MAX - s->pause_us ? UINT32_MAX : s->pause_us + seen->pause_us;
+            s->late_us = seen->late_us > UINT32_MAX - s->late_us ? UINT32_MAX : s->late_us + seen->late_us;
         }
         switch (dr_framer_push(&s->framer, s->kind, c->firmware, seen->bytes[i], &command)) {
         case DR_FRAMED_WHOLE:

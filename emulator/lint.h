@@ -68,6 +68,7 @@ typedef struct {
     uint16_t firmware;
     dr_framer framer;    /* the host's bytes as written */
     uint64_t began_ns;   /* the command in the framer: when its first byte was written */
+    uint32_t late_us;    /* what may be missing of the pauses within it and before it: the emulator was late */
     uint32_t pause_us;   /* within it */
     uint32_t unread;     /* when it began */
     uint64_t command_ns; /* the last whole command; 0: none yet */

@@ -1,5 +1,6 @@
 #include "station.h"
 
+#include "late.h" /* how far pauses can be believed */
 #include "link.h" /* the stable name */
 #include "tty.h"  /* the rate that the host has set */
 
@@ -211,6 +212,9 @@ void station_take(station *s, uint64_t now_us, uint64_t now_ns)
         seen.bytes = s->chunk;
         seen.count = s->chunk_count;
         seen.pause_us = pause;
+        const uint64_t late = late_us();
+        seen.late_us = (uint32_t)(late - s->late_us < UINT32_MAX ? late - s->late_us : UINT32_MAX);
+        s->late_us = late;
         const uint32_t unread = count_unread(s); /* with what has been due since: it had not read that either */
         seen.unread = unread > s->unread ? unread : s->unread;
         observe(s->observers, &seen);

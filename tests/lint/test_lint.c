@@ -203,6 +203,29 @@ static void pauses_on_both_sides_of_the_speed_add_up(void)
     found_nothing();
 }
 
+/* An emulator that had no processor for 20 ms cannot tell two writes from one. */
+static void an_emulator_that_was_late_does_not_judge_pauses(void)
+{
+    start(DR_MPC);
+    ask("F");
+    bench_wait_us(&b, 3000);
+    b.late_us = 20000;
+    bench_line(&b, 15, 16000, 0, 0, 0);
+    found_nothing();
+    b.late_us = 2000;
+    bench_say(&b, "C", 1);
+    found_nothing();
+}
+
+static void an_emulator_that_was_a_little_late_does(void)
+{
+    start(DR_MPC);
+    ask("F");
+    b.late_us = 19999;
+    bench_line(&b, 15, 16000, 0, 0, 0);
+    found(LINT_NO_PAUSE_IN_S, 1);
+}
+
 static void an_s_of_a_trio_has_no_pause(void)
 {
     start(DR_TRIO);
@@ -678,6 +701,8 @@ int main(void)
     RUN_TEST(an_s_with_19_999_ms_of_pause_lacks_some);
     RUN_TEST(an_s_with_20_ms_of_pause_is_taken);
     RUN_TEST(pauses_on_both_sides_of_the_speed_add_up);
+    RUN_TEST(an_emulator_that_was_late_does_not_judge_pauses);
+    RUN_TEST(an_emulator_that_was_a_little_late_does);
     RUN_TEST(an_s_of_a_trio_has_no_pause);
     RUN_TEST(one_step_beyond_the_travel_is_beyond);
     RUN_TEST(a_negative_target_is_beyond);
