@@ -17,7 +17,7 @@
 #include "unity.h"
 
 #define UM(um) ((int32_t)((um)*64))
-#define HEARD_MAX 4096u
+#define HEARD_MAX 65536u
 #define WIRE_MAX 65536u
 
 typedef struct bench bench;
@@ -54,9 +54,11 @@ struct bench {
 
     uint8_t sent[WIRE_MAX]; /* by the host, M1 */
     uint32_t sent_count;
+    uint32_t motions;    /* that left for the controller, since the start */
     dr_framer framer;    /* of the controller's bytes, M1 */
     uint8_t frame_state; /* M2: the guard's state before the frame's first byte */
-    bool refused_open;   /* M5 */
+    bool refused_open;   /* M5: a motion was refused, nothing was allowed since */
+    uint32_t owed;       /* M5: bytes to the host that answer something else */
     bool watch_tip;      /* M3 */
     uint64_t tip_checked;
     uint8_t state; /* M7 */
@@ -79,6 +81,8 @@ void bench_armed_mpc(void);
 /* Adds an obstacle to the limits of drive 0: um. */
 uint8_t keep_out(int32_t x0, int32_t x1, int32_t y0, int32_t y1, int32_t z0, int32_t z1);
 
+/* Makes room for more, between frames: drops what was sent and heard long ago. */
+void bench_forget(void);
 void run_us(uint64_t us);
 void run_ms(uint64_t ms);
 void run_until_state(dr_guard_state state, uint64_t at_most_ms);
@@ -93,6 +97,7 @@ size_t put_line_frame(uint8_t *frame, unsigned level, uint32_t x, uint32_t y, ui
 size_t put_point_frame(uint8_t *frame, int code, uint32_t x, uint32_t y, uint32_t z);
 void input(dr_input what, bool on);
 void press(dr_input what);
+void cables(bool host_open, bool device_present);
 void stop_input(bool on); /* both contacts */
 void clear_fault(void);   /* key off and on */
 
