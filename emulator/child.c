@@ -6,8 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/wait.h>
-
-extern char **environ;
+#include <unistd.h>
 
 pid_t child_start(char **command, const sigset_t *mask, int *exit_status)
 {

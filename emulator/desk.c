@@ -134,7 +134,7 @@ static FILE *connect_to(const char *path)
         errno = ENAMETOOLONG;
         return NULL;
     }
-    (void)strcpy(address.sun_path, path);
+    memcpy(address.sun_path, path, strlen(path) + 1);
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (fd >= 0 && connect(fd, (const struct sockaddr *)&address, sizeof address) == 0)
         return fdopen(fd, "r+");
@@ -179,7 +179,7 @@ int desk_ctl(const char *path, char **words)
         done = tell(line);
     else
         (void)fprintf(stderr, "dryrig-emu: ctl: %s: no answer\n", path);
-    if (done && strcmp(words[0], "subscribe") == 0)
+    if (done && words[0] != NULL && strcmp(words[0], "subscribe") == 0)
         while (!ferror(stdout) && getline(&line, &size, emulator) > 0) {
             (void)fputs(line, stdout);
             (void)fflush(stdout);

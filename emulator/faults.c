@@ -6,25 +6,25 @@
 #define MS UINT32_C(1000)
 
 static const fault_words words[FAULTS] = {
-    [FAULT_DROP_BYTE] = {"drop-byte", "one byte of an answer is lost", FAULT_OF_ANSWER, 0, false},
-    [FAULT_DELAY_BYTE] = {"delay-byte", "one byte of an answer, and what follows, is late", FAULT_OF_ANSWER, 200 * MS,
+    [FAULT_DROP_BYTE] = {"drop-byte", "one byte of an answer is lost", 0, FAULT_OF_ANSWER, false},
+    [FAULT_DELAY_BYTE] = {"delay-byte", "one byte of an answer, and what follows, is late", 200 * MS, FAULT_OF_ANSWER,
                           false},
-    [FAULT_DUPLICATE_BYTE] = {"duplicate-byte", "one byte of an answer comes twice", FAULT_OF_ANSWER, 0, false},
-    [FAULT_CORRUPT_BYTE] = {"corrupt-byte", "one bit of an answer is changed", FAULT_OF_ANSWER, 0, false},
-    [FAULT_DROP_CR] = {"drop-cr", "the CR of an answer is lost", FAULT_OF_ANSWER, 0, false},
-    [FAULT_LATE_CR] = {"late-cr", "the CR of an answer is late", FAULT_OF_ANSWER, 500 * MS, false},
-    [FAULT_STRAY_BYTES] = {"stray-bytes", "two bytes that mean nothing come before an answer", FAULT_OF_ANSWER, 0,
+    [FAULT_DUPLICATE_BYTE] = {"duplicate-byte", "one byte of an answer comes twice", 0, FAULT_OF_ANSWER, false},
+    [FAULT_CORRUPT_BYTE] = {"corrupt-byte", "one bit of an answer is changed", 0, FAULT_OF_ANSWER, false},
+    [FAULT_DROP_CR] = {"drop-cr", "the CR of an answer is lost", 0, FAULT_OF_ANSWER, false},
+    [FAULT_LATE_CR] = {"late-cr", "the CR of an answer is late", 500 * MS, FAULT_OF_ANSWER, false},
+    [FAULT_STRAY_BYTES] = {"stray-bytes", "two bytes that mean nothing come before an answer", 0, FAULT_OF_ANSWER,
                            false},
-    [FAULT_SLOW_ANSWER] = {"slow-answer", "an answer is late", FAULT_OF_ANSWER, 500 * MS, false},
-    [FAULT_SHORT_FRAME] = {"short-frame", "a streamed frame lacks its last bytes", FAULT_OF_FRAME, 0, false},
-    [FAULT_TORN_FRAME] = {"torn-frame", "a streamed frame stops in its middle for a while", FAULT_OF_FRAME, 50 * MS,
+    [FAULT_SLOW_ANSWER] = {"slow-answer", "an answer is late", 500 * MS, FAULT_OF_ANSWER, false},
+    [FAULT_SHORT_FRAME] = {"short-frame", "a streamed frame lacks its last bytes", 0, FAULT_OF_FRAME, false},
+    [FAULT_TORN_FRAME] = {"torn-frame", "a streamed frame stops in its middle for a while", 50 * MS, FAULT_OF_FRAME,
                           false},
-    [FAULT_LOSE_HOST_BYTE] = {"lose-host-byte", "a byte of the host never arrives", FAULT_OF_HOST_BYTE, 0, false},
-    [FAULT_IGNORE_STOP] = {"ignore-stop", "^C never arrives", FAULT_OF_STOP, 0, false},
-    [FAULT_WEDGE] = {"wedge", "deaf and mute from a command on, until a power cycle", FAULT_OF_COMMAND, 0, false},
-    [FAULT_STALL_AXIS] = {"stall-axis", "an axis gets half of its way only; the answer is as ever", FAULT_OF_LEG, 0,
+    [FAULT_LOSE_HOST_BYTE] = {"lose-host-byte", "a byte of the host never arrives", 0, FAULT_OF_HOST_BYTE, false},
+    [FAULT_IGNORE_STOP] = {"ignore-stop", "^C never arrives", 0, FAULT_OF_STOP, false},
+    [FAULT_WEDGE] = {"wedge", "deaf and mute from a command on, until a power cycle", 0, FAULT_OF_COMMAND, false},
+    [FAULT_STALL_AXIS] = {"stall-axis", "an axis gets half of its way only; the answer is as ever", 0, FAULT_OF_LEG,
                           true},
-    [FAULT_SLIP_AXIS] = {"slip-axis", "the position of an axis counts, its tip stays", FAULT_OF_LEG, 0, true}};
+    [FAULT_SLIP_AXIS] = {"slip-axis", "the position of an axis counts, its tip stays", 0, FAULT_OF_LEG, true}};
 
 const fault_words *faults_words(fault_id id) { return &words[id]; }
 

@@ -43,8 +43,8 @@ typedef enum {
 typedef struct {
     const char *name;
     const char *meaning;
-    uint8_t strikes;   /* fault_chance: what it strikes */
     uint32_t delay_us; /* 0: it does not take a time; else how late, where nothing is said */
+    uint8_t strikes;   /* fault_chance: what it strikes */
     bool takes_axis;
 } fault_words;
 

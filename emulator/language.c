@@ -194,7 +194,7 @@ static bool add_trigger(telling *t, dr_op op, unsigned count, bool is_each)
 static bool do_after(telling *t)
 {
     unsigned count;
-    char why[WHY_ROOM];
+    char why[WHY_ROOM] = "";
     const char *const word = telling_next(t);
     if (!values_number(word == NULL ? "" : word, 1, 1000000, &count, why))
         return about(t, word, why);
@@ -205,7 +205,7 @@ static bool do_after(telling *t)
 
 static bool do_on(telling *t)
 {
-    dr_op op;
+    dr_op op = DR_OP_NONE;
     const bool is_each = telling_take(t, "each");
     return telling_command(t, &op) && add_trigger(t, op, 1, is_each);
 }
@@ -271,7 +271,7 @@ static bool choose_station(telling *t)
 {
     engine *const e = t->l->e;
     t->s = e->station_count == 1 ? &e->stations[0] : NULL;
-    if (t->words[0][0] != '@')
+    if (t->words[0] == NULL || t->words[0][0] != '@')
         return true;
     for (unsigned i = 0; i < e->station_count; i++)
         if (strcmp(e->stations[i].name, t->words[0] + 1) == 0) {
@@ -290,7 +290,7 @@ static bool carry_out(telling *t, char *line)
     const verb *const v = find(name);
     if (v == NULL)
         return telling_wrong(t, "'%s' is no verb; 'help' lists them", name);
-    if (v->needs_one && t->s == NULL)
+    if (v->needs_one && t->s == NULL && t->l->e->station_count > 1)
         return telling_wrong(t, "which controller? Write @%s before it, or another one's name",
                              t->l->e->stations[0].name);
     if (v->carry_out(t))
