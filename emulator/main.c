@@ -11,10 +11,11 @@
 #include "engine.h" /* the loop */
 #include "lint.h"   /* which rules the host breaks */
 #include "lint_report.h"
-#include "options.h" /* what was asked for */
-#include "record.h"  /* the bytes of the line, kept */
-#include "replay.h"  /* and played again */
-#include "trace.h"   /* what happens, in words */
+#include "options.h"  /* what was asked for */
+#include "record.h"   /* the bytes of the line, kept */
+#include "replay.h"   /* and played again */
+#include "terminal.h" /* leaving it as it was */
+#include "trace.h"    /* what happens, in words */
 
 #include "dr_words.h" /* names for people */
 
@@ -26,6 +27,7 @@
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
+#include <time.h>
 #include <unistd.h>
 
 #define PATH_ROOM 512u
@@ -45,7 +47,8 @@ typedef struct {
     observer_link *record_links;
     int signal_fd;
     sigset_t mask_before;
-    pid_t child; /* 0: none */
+    pid_t child;       /* 0: none */
+    terminal terminal; /* TASK_PANEL: as it was */
     int status;
     char directory[PATH_ROOM]; /* for the command of `run`: links and socket; "": none */
 } program;
@@ -55,6 +58,9 @@ static int fail(const char *what)
     (void)fprintf(stderr, "dryrig-emu: %s: %s\n", what, strerror(errno));
     return 1;
 }
+
+/* It lives as long as another program. */
+static bool has_command(const program *p) { return p->o->task == TASK_RUN || p->o->task == TASK_PANEL; }
 
 /* -- Signals --------------------------------------------------------------------------------------------------------- */
 
@@ -89,7 +95,7 @@ static bool open_signals(program *p)
     struct sigaction hangup;
     if (sigaction(SIGHUP, NULL, &hangup) != 0 || hangup.sa_handler != SIG_IGN)
         (void)sigaddset(&caught, SIGHUP);
-    if (p->o->task == TASK_RUN) {
+    if (has_command(p)) {
         (void)sigaddset(&caught, SIGCHLD);
         (void)sigaddset(&caught, SIGQUIT);
         (void)sigaddset(&caught, SIGUSR1);
@@ -97,7 +103,7 @@ static bool open_signals(program *p)
         (void)signal(SIGCHLD, SIG_DFL); /* where it came in ignored, the command's end would go unseen */
     }
     (void)sigprocmask(SIG_BLOCK, &caught, &p->mask_before);
-    if (p->o->task != TASK_RUN) {
+    if (!has_command(p)) {
         (void)signal(SIGINT, SIG_DFL);
         (void)signal(SIGTERM, SIG_DFL);
     }
@@ -202,7 +208,7 @@ static bool prepare_run(program *p)
 {
     if (!make_directory(p))
         return false;
-    for (unsigned i = 0; i < p->e.station_count; i++)
+    for (unsigned i = 0; i < p->e.station_count && p->o->task == TASK_RUN; i++)
         if (p->e.stations[i].link == NULL && (p->e.stations[i].link = in_directory(p, p->e.stations[i].name)) == NULL)
             return false;
     if (p->o->control == NULL)
@@ -349,6 +355,43 @@ static bool do_first(program *p)
     return true;
 }
 
+/* The panel is beside this program, or wherever programs are. */
+static bool start_panel(program *p)
+{
+    static char name[] = "dryrig-panel";
+    char path[PATH_ROOM], socket[PATH_ROOM + RIG_NAME_MAX];
+    const ssize_t length = readlink("/proc/self/exe", path, sizeof path - sizeof name);
+    path[length > 0 ? length : 0] = '\0';
+    char *const slash = strrchr(path, '/');
+    (void)strcpy(slash == NULL ? path : slash + 1, name);
+    (void)snprintf(socket, sizeof socket, "%s", p->o->control);
+    char *command[] = {access(path, X_OK) == 0 ? path : name, socket, NULL};
+    terminal_keep(&p->terminal);
+    p->child = child_start(command, &p->mask_before, &p->status);
+    return p->child > 0;
+}
+
+static bool start_command(program *p)
+{
+    if (p->o->task == TASK_PANEL)
+        return start_panel(p);
+    set_environment(p);
+    p->child = child_start(p->o->command, &p->mask_before, &p->status);
+    return p->child > 0;
+}
+
+/* The panel ends with the control channel. One that was killed has left the terminal as it was drawn on. */
+static void end_panel(program *p)
+{
+    while (p->child > 0 && !child_has_ended(p->child, &p->status)) {
+        const struct timespec moment = {0, 10000000};
+        (void)nanosleep(&moment, NULL);
+    }
+    p->child = 0;
+    if (p->status > 128)
+        terminal_restore(&p->terminal);
+}
+
 /* The ports are open, the links are made. */
 static void start_and_run(program *p)
 {
@@ -360,24 +403,19 @@ static void start_and_run(program *p)
         (void)fprintf(stderr, "dryrig-emu: --control: %s\n", why);
         return;
     }
-    const bool has_command = p->o->task == TASK_RUN;
-    if (!has_command)
+    if (!has_command(p))
         introduce(p);
     engine_start(&p->e);
     if (!do_first(p)) {
         p->status = 2;
         return;
     }
-    if (!has_command && !say_ready(p)) {
+    if (!has_command(p) && !say_ready(p)) {
         (void)fail("cannot write the line 'ready' to stdout");
         return;
     }
-    if (has_command) {
-        set_environment(p);
-        p->child = child_start(p->o->command, &p->mask_before, &p->status);
-        if (p->child == 0)
-            return;
-    }
+    if (has_command(p) && !start_command(p))
+        return;
     p->status = 0;
     engine_run(&p->e);
 }
@@ -399,12 +437,14 @@ static int run(program *p)
         return fail("no memory");
     if (!engine_open(&p->e) || !open_signals(p))
         return fail("cannot wait for events (/proc/sys/fs/inotify and ulimit -n have limits)");
-    if (p->o->task == TASK_RUN && !prepare_run(p))
+    if (has_command(p) && !prepare_run(p))
         return fail("run: cannot make a directory for the command's ports (TMPDIR says where)");
     if (engine_plug(&p->e, why, sizeof why)) {
         start_and_run(p);
         tell_seed(p);
         desk_close(&p->desk);
+        if (p->o->task == TASK_PANEL)
+            end_panel(p);
         engine_close(&p->e);
         trace_close(&p->trace);
         recorder_close(&p->recorder);

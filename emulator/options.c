@@ -17,6 +17,7 @@ typedef struct {
     const char *words[3];
     unsigned word_count;
     const char *link, *clock, *speedup, *seed, *rig, *lint;
+    bool has_panel;
 } typed;
 
 const char *argp_program_version = "dryrig-emu " DRYRIG_VERSION;
@@ -52,6 +53,7 @@ enum {
     DO,
     SEED,
     RIG_FILE,
+    PANEL,
     LINT,
     LINT_JSON,
     LINT_JUNIT,
@@ -98,6 +100,7 @@ static const struct argp_option known[] = {
     {"record", RECORD, "FILE", 0, "Write the bytes of both directions, with times, to FILE", 5},
     {"control", CONTROL, "PATH", 0,
      "Make a socket PATH that takes commands: 'dryrig-emu ctl PATH help', see dryrig-control(7)", 5},
+    {"panel", PANEL, NULL, 0, "Show the controller's panel in this terminal; it ends with it. See dryrig-panel(1)", 5},
     {"do", DO, "COMMAND", 0, "Do this at the start, in the same language; may be repeated", 5},
     {"seed", SEED, "N", 0, "Where chance begins (default: another one each time)", 5},
     {"lint", LINT, "on|off", OPTION_ARG_OPTIONAL,
@@ -193,6 +196,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case RECORD:
         once(state, &t->o->record, "record", value);
         break;
+    case PANEL:
+        t->has_panel = true;
+        break;
     case STRICT:
         t->o->is_strict = true;
         break;
@@ -247,6 +253,18 @@ static void read_task(options *o, typed *t)
         refuse(t->rig == NULL ? "one controller at a time: '%s' is one too many"
                               : "the controllers are those of the rig file: '%s' is one too many",
                t->words[at]);
+}
+
+static void read_panel(options *o, const typed *t)
+{
+    if (!t->has_panel)
+        return;
+    if (o->task != TASK_EMULATE)
+        refuse("--panel is for dryrig-emu trio|mpc|rig; with run, start dryrig-panel \"$DRYRIG_CONTROL\" in another "
+               "terminal");
+    if (o->trace != NULL && strcmp(o->trace, "-") == 0)
+        refuse("--panel and --trace - would write over each other; --trace FILE does not");
+    o->task = TASK_PANEL;
 }
 
 static clock_mode read_clock(const char *text)
@@ -348,6 +366,7 @@ options options_read(int argc, char **argv)
     read_task(&o, &t);
     if (o.task == TASK_REPLAY) /* the recording says the rest */
         return o;
+    read_panel(&o, &t);
     o.clock = read_clock(t.clock);
     char why[WHY_ROOM];
     o.speedup = 1;

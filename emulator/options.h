@@ -11,6 +11,7 @@
 typedef enum {
     TASK_EMULATE, /* one controller, or those of a rig file */
     TASK_RUN,     /* the same, for as long as a command runs */
+    TASK_PANEL,   /* the same, for as long as its panel is in the terminal */
     TASK_CHECK,   /* is this rig file right? */
     TASK_REPLAY   /* does a controller still answer as in this recording? */
 } task;
@@ -21,18 +22,18 @@ typedef struct {
     const char *rig_file; /* NULL: one controller */
     char **command;       /* TASK_RUN: its words, NULL at the end */
     clock_mode clock;
-    unsigned speedup; /* 1 to SPEEDUP_MAX */
-    bool waits_for_client;
+    unsigned speedup;                   /* 1 to SPEEDUP_MAX */
     const char *trace;                  /* NULL: none; "-": stderr */
-    bool lints;                         /* tells at the end which rules the host has broken */
     const char *lint_json, *lint_junit; /* files for the same; NULL: none */
-    bool is_strict;                     /* TASK_RUN: findings turn the command's exit status 0 into 3 */
     const char *record;                 /* where the bytes of the line go; NULL: nowhere */
     const char *replay;                 /* TASK_REPLAY: the recording */
     const char *control;                /* NULL: none */
     const char *dos[OPTIONS_DO_MAX];
     unsigned do_count;
     uint64_t seed;
+    bool waits_for_client;
+    bool lints;          /* tells at the end which rules the host has broken */
+    bool is_strict;      /* TASK_RUN: findings turn the command's exit status 0 into 3 */
     bool seed_is_chosen; /* by the program */
 } options;
 

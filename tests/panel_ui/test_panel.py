@@ -74,6 +74,10 @@ class Terminal:
         with open(f"/proc/{shell}/task/{shell}/children", encoding="ascii") as file:
             return int(file.read().split()[0])
 
+    def is_left(self):
+        flags = self.tmux("display-message", "-p", "-t", "panel", "#{alternate_on} #{cursor_flag} #{keypad_flag}")
+        return flags.strip() == "0 1 0"
+
     def ended(self, status):
         """Waits until the panel has ended, and sees that the terminal is as it was."""
         emu.wait_until(lambda: os.path.exists(self.after), "the panel ends")
@@ -81,9 +85,8 @@ class Terminal:
         with open(self.before, encoding="ascii") as before, open(self.after, encoding="ascii") as after:
             if before.read() != after.read():
                 raise AssertionError("the terminal is not as it was")
-        flags = self.tmux("display-message", "-p", "-t", "panel", "#{alternate_on} #{cursor_flag} #{keypad_flag}").strip()
-        if flags != "0 1 0":
-            raise AssertionError(f"alternate screen, cursor, keypad: {flags}")
+        if not self.is_left():
+            raise AssertionError("the alternate screen, the hidden cursor, or the keypad is still there")
         return self.tmux("capture-pane", "-p", "-J", "-t", "panel")
 
 
@@ -346,6 +349,75 @@ class Ends(unittest.TestCase):
             t.shows("green", "ABSOLUTE")
             t.keys("q")
             emu.wait_until(lambda: os.path.exists(t.after), "the panel ends")
+
+
+class InTheSameTerminal(unittest.TestCase):
+    """dryrig-emu ... --panel"""
+
+    def setUp(self):
+        self.directory = self.enterContext(emu.directory())
+        os.environ["TMPDIR"] = self.directory
+        self.addCleanup(os.environ.pop, "TMPDIR")
+
+    def panel_of(self, terminal):
+        pid = terminal.child()
+        with open(f"/proc/{pid}/task/{pid}/children", encoding="ascii") as file:
+            return int(file.read().split()[0])
+
+    def emulator(self, *args):
+        return Terminal("env", "TMPDIR=" + self.directory, emu.PROGRAM, *args)
+
+    def test_it_ends_with_its_panel(self):
+        for args in (("trio",), ("mpc", "--clock", "jump")):
+            with self.emulator(*args, "--panel") as t:
+                t.shows("0.00", "? help")
+                t.keys("q")
+                text = t.ended(0)
+                self.assertNotIn("dryrig", text)
+        self.assertEqual(os.listdir(self.directory), [])
+
+    def test_a_panel_that_is_killed_leaves_the_terminal_usable(self):
+        with self.emulator("trio", "--panel") as t:
+            t.shows("ABSOLUTE")
+            os.kill(self.panel_of(t), signal.SIGKILL)
+            t.ended(128 + signal.SIGKILL)
+            t.keys(*"typed", "Enter")  # by the cat that the shell has become
+            t.shows("typed\ntyped")
+        self.assertEqual(os.listdir(self.directory), [])
+
+    def test_an_emulator_that_is_stopped_takes_its_panel_along(self):
+        with self.emulator("trio", "--panel") as t:
+            t.shows("ABSOLUTE")
+            os.kill(t.child(), signal.SIGTERM)
+            t.ended(0)
+        self.assertEqual(os.listdir(self.directory), [])
+
+    def test_an_emulator_that_is_told_to_quit(self):
+        control = os.path.join(self.directory, "control")
+        with self.emulator("trio", "--panel", "--control", control) as t:
+            t.shows("ABSOLUTE")
+            t.keys(":", *"quit", "Enter")
+            self.assertIn("the emulator has ended", t.ended(1))
+        self.assertEqual(os.listdir(self.directory), [])
+
+    def test_an_emulator_that_is_killed(self):
+        with self.emulator("trio", "--panel") as t:
+            t.shows("ABSOLUTE")
+            panel = self.panel_of(t)
+            os.kill(t.child(), signal.SIGKILL)
+            emu.wait_until(lambda: not os.path.exists(f"/proc/{panel}"), "the panel ends by itself")
+            emu.wait_until(t.is_left, "it leaves the terminal")
+
+    def test_what_does_not_go_with_it(self):
+        status, _, error = emu.outcome("run", "trio", "--panel", "--", "true")
+        self.assertEqual(status, 2)
+        self.assertIn("--panel is for dryrig-emu trio|mpc|rig", error)
+        status, _, error = emu.outcome("trio", "--panel", "--trace", "-")
+        self.assertEqual(status, 2)
+        self.assertIn("would write over each other", error)
+        status, out, error = emu.outcome("trio", "--panel")
+        self.assertEqual((status, out), (2, ""))
+        self.assertIn("a terminal is needed", error)
 
 
 emu.main()
