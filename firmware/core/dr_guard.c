@@ -261,6 +261,8 @@ static void withdraw(dr_guard *g)
 
 static void send_stop(dr_guard *g, dr_us now, dr_stop_cause cause)
 {
+    if (g->torn) /* it would not be heard as ^C, and might complete a motion */
+        return;
     if (g->stops_out < RAW_STOPS_MAX)
         g->stops_out++;
     log_event(g, now, DR_EVENT_STOP, (uint8_t)cause, DR_NO_ITEM);
@@ -1375,6 +1377,10 @@ static void confirm_pressed(dr_guard *g, dr_us now)
 {
     g->tip_changed = false;
     g->confirmed = true;
+    if (g->torn) { /* somebody has cycled the controller's power: it has forgotten its half of the frame */
+        g->torn = false;
+        dr_guard_link(g, now, g->host_open, g->plugged);
+    }
     if (g->ambiguous)
         identity_proved(g);
     if (g->cut && g->mode == MODE_DISARMED) { /* somebody has made room for the calibration at power-on */
@@ -1438,10 +1444,11 @@ static void lose_device(dr_guard *g)
     if (moved)
         break_off_unproved(g);
     end_task(g);
+    g->torn = is_leaving(g);
     g->out_at = g->out_count = g->out_ready = g->stops_out = 0;
     clear_timer(g, DR_TIMER_SEND);
     g->position_known = false;
-    lock(g, DR_FAULT_NO_DEVICE);
+    lock(g, g->torn ? DR_FAULT_TORN : DR_FAULT_NO_DEVICE);
 }
 
 static void lose_host(dr_guard *g, dr_us now)
@@ -1458,13 +1465,15 @@ static void lose_host(dr_guard *g, dr_us now)
 void dr_guard_link(dr_guard *g, dr_us now, bool host_open, bool device_present)
 {
     settle(g, now);
-    const bool host_lost = g->host_open && !host_open, device_lost = g->device_present && !device_present;
-    const bool device_came = !g->device_present && device_present;
-    if (g->host_open == host_open && g->device_present == device_present)
+    const bool present = device_present && !g->torn;
+    const bool host_lost = g->host_open && !host_open, device_lost = g->device_present && !present;
+    const bool device_came = !g->device_present && present;
+    g->plugged = device_present;
+    if (g->host_open == host_open && g->device_present == present)
         return;
     g->host_open = host_open;
-    g->device_present = device_present;
-    log_event(g, now, DR_EVENT_LINK, (uint8_t)((host_open ? 1u : 0u) | (device_present ? 2u : 0u)), DR_NO_ITEM);
+    g->device_present = present;
+    log_event(g, now, DR_EVENT_LINK, (uint8_t)((host_open ? 1u : 0u) | (present ? 2u : 0u)), DR_NO_ITEM);
     if (device_came && g->after_reset)
         send_stop(g, now, DR_STOP_AFTER_RESET);
     g->after_reset = g->after_reset && !device_came;
@@ -1507,7 +1516,7 @@ void dr_guard_get_status(const dr_guard *g, dr_guard_status *out)
         if (g->unsteady)
             out->needs |= DR_NEEDS_STEADY;
         out->confirm_wanted = g->ambiguous || g->tip_changed || (g->limits->obstacle_count == 0 && !g->confirmed) ||
-                              (g->cut && g->mode == MODE_DISARMED);
+                              (g->cut && g->mode == MODE_DISARMED) || g->torn;
     }
     out->in_tissue = is_on(g, DR_INPUT_IN_TISSUE);
     out->escape = is_on(g, DR_INPUT_ESCAPE);

@@ -57,6 +57,8 @@ typedef enum {
     DR_FAULT_FRAME_LOST,       /* a calibration was broken off: only a calibration may move anything */
     DR_FAULT_STOP_WIRING,      /* the two stop contacts disagree for more than 50 ms */
     DR_FAULT_DAMAGED,          /* limits or state in memory are not what they were: restart the guard */
+    DR_FAULT_TORN, /* locks: the cable went within a frame, whose rest the controller takes from any byte that
+                                * comes: cycle its power, then CONFIRM */
     DR_FAULTS
 } dr_fault;
 
@@ -79,7 +81,7 @@ typedef struct {
     uint8_t state;       /* dr_guard_state */
     uint8_t fault;       /* dr_fault that is latched or locks */
     uint16_t needs;      /* DR_NEEDS_* */
-    bool confirm_wanted; /* identity is ambiguous, tip changed, or there are no obstacles: CONFIRM */
+    bool confirm_wanted; /* identity is ambiguous, tip changed, no obstacles, a cut, a torn frame: CONFIRM */
     bool in_tissue, escape, may_calibrate;
     bool buzzer;              /* a stop was asked for and something may still move */
     bool cut;                 /* open the relay in the controller's supply (DR_RIG_HAS_CUT) */
@@ -168,6 +170,7 @@ typedef struct {
     uint8_t fault, shown_state;
     uint16_t inputs; /* bit per dr_input */
     bool host_open, device_present;
+    bool plugged, torn;  /* the device's cable, while it counts as not present: half a frame is in the controller */
     bool after_reset;    /* a ^C goes first when the device is there */
     bool proved;         /* it is the controller of the limits */
     bool other_firmware; /* it said so itself */
@@ -240,7 +243,8 @@ bool dr_guard_due(const dr_guard *g, dr_us *when);
 
 /* What a person does. Never call it for anything that came over the host's wire. */
 void dr_guard_input(dr_guard *g, dr_us now, dr_input what, bool on);
-/* Cables: may be called with nothing changed. device_present false -> true: the identity is proved anew. The caller looks
+/* Cables: may be called with nothing changed. device_present false -> true: the identity is proved anew (after
+ * DR_FAULT_TORN: from CONFIRM on; until then nothing leaves for the device, ^C neither). The caller looks
  * at the converter's serial number itself: another one than the limits' is a device that is not present. */
 void dr_guard_link(dr_guard *g, dr_us now, bool host_open, bool device_present);
 /* A byte was lost on the line from the host (overrun, framing or parity error): the frame is dropped. */

@@ -866,6 +866,51 @@ static void row_88_no_manipulator_connected(void)
     expect_refused(DR_REASON_NO_POSITION);
 }
 
+/* The controller waits for the rest of the frame and takes it from whatever comes: a query, a ^C. */
+static void a_cable_pulled_within_a_frame_leaves_nothing_that_completes_it(void)
+{
+    for (uint8_t cut = 1; cut < 14; cut++) {
+        bench_trio();
+        rig.controller.calibrates_at_power_on = false;
+        bench_start();
+        bench_arm();
+        host_line(15, 40800, 40000, 40000);
+        while (rig.guard.out_at < cut || rig.guard.out_count < 14) /* until so much of it has left */
+            run_us(10);
+        cables(true, false);
+        expect_fault(DR_FAULT_TORN);
+        const uint32_t sent = rig.wire_count;
+        run_ms(10);
+        cables(true, true);
+        host_code(0x03);
+        host_code('C');
+        stop_input(true);
+        run_ms(70000);
+        stop_input(false);
+        clear_fault();
+        run_ms(70000);
+        TEST_ASSERT_EQUAL(sent, rig.wire_count);
+        expect_state(DR_GUARD_LOCKED);
+        expect_tip(0, 40000, 40000, 40000);
+        TEST_ASSERT_TRUE(status().confirm_wanted);
+
+        const dr_hand off = {DR_HAND_POWER_OFF, 0, 0, {0, 0, 0}}, on = {DR_HAND_POWER_ON, 0, 0, {0, 0, 0}};
+        const dr_us now = (dr_us)(rig.clock_at_start + rig.now);
+        TEST_ASSERT_TRUE(dr_controller_poke(&rig.controller, now, &off));
+        TEST_ASSERT_TRUE(dr_controller_poke(&rig.controller, now, &on));
+        if (cut % 2 == 0) { /* confirmed with the cable in, or before */
+            press(DR_INPUT_CONFIRM);
+        } else {
+            cables(true, false);
+            press(DR_INPUT_CONFIRM);
+            cables(true, true);
+        }
+        run_ms(1100);
+        expect_state(DR_GUARD_DISARMED);
+        expect_tip(0, 40000, 40000, 40000);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -906,5 +951,6 @@ int main(void)
     RUN_TEST(row_86_a_calibration_that_was_broken_off);
     RUN_TEST(row_17_a_trio_calibrates_with_leave);
     RUN_TEST(row_88_no_manipulator_connected);
+    RUN_TEST(a_cable_pulled_within_a_frame_leaves_nothing_that_completes_it);
     return UNITY_END();
 }
