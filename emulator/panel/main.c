@@ -25,8 +25,9 @@
 
 #define ASK_MOVING_MS 100
 #define ASK_RESTING_MS 300
-#define DRAW_MS 50 /* at least between two pictures, however fast things happen */
-#define LINE 440u  /* the control channel takes 511 characters, the name of the controller included */
+#define LISTEN_MS 20 /* between two readings: a stream has a thousand lines a second */
+#define DRAW_MS 50   /* at least between two pictures, however fast things happen */
+#define LINE 440u    /* the control channel takes 511 characters, the name of the controller included */
 #define KEY_ESCAPE 27
 #define KEY_DELETE 127
 
@@ -38,9 +39,9 @@ typedef struct {
     int status;
     char why[MODEL_TEXT]; /* it is over; "": as asked */
 
-    int64_t ask_ms, draw_ms; /* when next */
-    bool waits;              /* for the answers to what was asked */
-    bool is_changed;         /* since it was drawn */
+    int64_t ask_ms, draw_ms, listen_ms; /* when next */
+    bool waits;                         /* for the answers to what was asked */
+    bool is_changed;                    /* since it was drawn */
     unsigned beeps;
 
     unsigned detents;
@@ -148,8 +149,18 @@ static void take(panel *p, const char *line)
 static void read_emulator(panel *p)
 {
     const bool is_there = client_read(&p->link);
-    for (const char *line; !p->is_over && (line = client_next(&p->link)) != NULL;)
-        take(p, line);
+    const char *newest = NULL; /* of a stream, whose others would be overwritten at once */
+    for (const char *line; !p->is_over && (line = client_next(&p->link)) != NULL;) {
+        const bool is_stream = strstr(line, "\"note\":\"stream\"") != NULL;
+        if (newest != NULL && !is_stream)
+            take(p, newest);
+        newest = is_stream ? line : NULL;
+        if (!is_stream)
+            take(p, line);
+    }
+    if (newest != NULL && !p->is_over)
+        take(p, newest);
+    p->listen_ms = now_ms() + LISTEN_MS;
     if (!is_there && !p->is_over)
         end(p, 1, "the emulator has ended");
 }
@@ -251,17 +262,23 @@ static int until(int64_t when_ms, int64_t now)
 static int sleep_ms(const panel *p)
 {
     const int64_t now = now_ms();
-    const int ask_in = p->waits ? -1 : until(p->ask_ms, now);
-    const int draw_in = p->is_changed ? until(p->draw_ms, now) : -1;
-    return ask_in < 0 ? draw_in : draw_in < 0 ? ask_in : ask_in < draw_in ? ask_in : draw_in;
+    int64_t next = INT64_MAX;
+    if (!p->waits)
+        next = p->ask_ms;
+    if (p->is_changed && p->draw_ms < next)
+        next = p->draw_ms;
+    if (p->listen_ms > now && p->listen_ms < next)
+        next = p->listen_ms;
+    return next == INT64_MAX ? -1 : until(next, now);
 }
 
 static void run(panel *p)
 {
     while (!p->is_over) {
-        struct pollfd fds[] = {{p->link.fd, (short)(POLLIN | (p->link.out_count > 0 ? POLLOUT : 0)), 0},
-                               {STDIN_FILENO, POLLIN, 0},
-                               {p->signals, POLLIN, 0}};
+        struct pollfd fds[] = {
+            {p->listen_ms > now_ms() ? -1 : p->link.fd, (short)(POLLIN | (p->link.out_count > 0 ? POLLOUT : 0)), 0},
+            {STDIN_FILENO, POLLIN, 0},
+            {p->signals, POLLIN, 0}};
         const int count = poll(fds, 3, sleep_ms(p)); /* a new size of the window interrupts it */
         if (count < 0 && errno != EINTR)
             end(p, 1, strerror(errno));

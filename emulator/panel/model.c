@@ -214,6 +214,8 @@ static void take_panel(model *m, const cJSON *answer)
 model_line model_take(model *m, const char *line, char why[MODEL_TEXT], char next[MODEL_NAME])
 {
     model_line what = MODEL_NOTHING;
+    if (strncmp(line, "{\"event\":\"to-host\"", 18) == 0) /* its notes tell the same, and these are many */
+        return MODEL_EVENT;
     cJSON *const object = cJSON_Parse(line);
     const char *const event = cJSON_GetStringValue(get(object, "event"));
     if (event != NULL) {
