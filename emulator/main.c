@@ -363,7 +363,7 @@ static bool start_panel(program *p)
     const ssize_t length = readlink("/proc/self/exe", path, sizeof path - sizeof name);
     path[length > 0 ? length : 0] = '\0';
     char *const slash = strrchr(path, '/');
-    (void)strcpy(slash == NULL ? path : slash + 1, name);
+    memcpy(slash == NULL ? path : slash + 1, name, sizeof name);
     (void)snprintf(socket, sizeof socket, "%s", p->o->control);
     char *command[] = {access(path, X_OK) == 0 ? path : name, socket, NULL};
     terminal_keep(&p->terminal);
