@@ -1,6 +1,7 @@
 """dryrig-panel in a terminal: what it shows and what its keys do, through tmux; the emulator's clock is moved by the test.
 
 Numbers are those of test_hands.py."""
+import contextlib
 import os
 import signal
 import subprocess
@@ -33,7 +34,14 @@ class Terminal:
         return self
 
     def __exit__(self, *_):
-        self.tmux("kill-server")
+        """Nothing stays behind: the panel ends before its terminal does."""
+        try:
+            if not os.path.exists(self.after):
+                with contextlib.suppress(ProcessLookupError, IndexError):
+                    os.kill(self.child(), signal.SIGTERM)
+                emu.wait_until(lambda: os.path.exists(self.after), "the panel ends")
+        finally:
+            self.tmux("kill-server")
         self.context.__exit__(None, None, None)
 
     def tmux(self, *args):
