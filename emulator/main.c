@@ -12,6 +12,7 @@
 #include "lint.h"   /* which rules the host breaks */
 #include "lint_report.h"
 #include "options.h"  /* what was asked for */
+#include "playback.h" /* the controller's side of a recording, for a host */
 #include "record.h"   /* the bytes of the line, kept */
 #include "replay.h"   /* and played again */
 #include "terminal.h" /* leaving it as it was */
@@ -473,6 +474,8 @@ int main(int argc, char **argv)
     p.o = &o;
     if (o.task == TASK_REPLAY)
         return replay(o.replay);
+    if (o.task == TASK_PLAYBACK)
+        return playback(&(playback_options){o.replay, o.playback_link, o.speedup, o.clock != CLOCK_REAL});
     if (o.task == TASK_CHECK) {
         (void)printf("%s: %u controller%s, nothing wrong\n", o.rig_file, o.rig.count, o.rig.count == 1 ? "" : "s");
         return 0;

@@ -13,7 +13,8 @@ typedef enum {
     TASK_RUN,     /* the same, for as long as a command runs */
     TASK_PANEL,   /* the same, for as long as its panel is in the terminal */
     TASK_CHECK,   /* is this rig file right? */
-    TASK_REPLAY   /* does a controller still answer as in this recording? */
+    TASK_REPLAY,  /* does a controller still answer as in this recording? */
+    TASK_PLAYBACK /* does a host still ask as in this recording? */
 } task;
 
 typedef struct {
@@ -26,7 +27,8 @@ typedef struct {
     const char *trace;                  /* NULL: none; "-": stderr */
     const char *lint_json, *lint_junit; /* files for the same; NULL: none */
     const char *record;                 /* where the bytes of the line go; NULL: nowhere */
-    const char *replay;                 /* TASK_REPLAY: the recording */
+    const char *replay;                 /* TASK_REPLAY, TASK_PLAYBACK: the recording */
+    const char *playback_link;          /* TASK_PLAYBACK: the port's stable name; NULL: none */
     const char *control;                /* NULL: none */
     const char *dos[OPTIONS_DO_MAX];
     unsigned do_count;

@@ -1,10 +1,14 @@
+#define _GNU_SOURCE /* poll, fileno, fopen "e" */
 #include "record.h"
 
 #include "dr_record.h" /* the format */
 #include "dr_words.h"  /* names of stages and quirks */
 
 #include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #define NS_PER_US UINT64_C(1000)
 #define TEXT 512u
@@ -16,8 +20,29 @@ bool recorder_open(recorder *r, const char *path)
     memset(r, 0, sizeof *r);
     r->base.see = see;
     r->path = path;
-    r->file = fopen(path, "we");
-    return r->file != NULL && dr_record_begin(r->file);
+    struct stat is;
+    const bool is_pipe = stat(path, &is) == 0 && S_ISFIFO(is.st_mode);
+    const int pipe_fd = is_pipe ? open(path, O_RDWR | O_CLOEXEC) : -1; /* to write alone would wait for a reader */
+    r->file = is_pipe ? (pipe_fd < 0 ? NULL : fdopen(pipe_fd, "w")) : fopen(path, "we");
+    if (r->file == NULL)
+        return false;
+    r->is_file = fstat(fileno(r->file), &is) == 0 && S_ISREG(is.st_mode);
+    if (!r->is_file)
+        (void)setvbuf(r->file, NULL, _IOLBF, BUFSIZ);
+    return dr_record_begin(r->file);
+}
+
+/* A pipe or a terminal that has room for anything has room for what is seen at once. */
+static bool has_room(recorder *r)
+{
+    struct pollfd file = {.fd = fileno(r->file), .events = POLLOUT};
+    if (r->is_file || poll(&file, 1, 0) != 0)
+        return true;
+    r->lost++;
+    if (!r->told_loss)
+        (void)fprintf(stderr, "dryrig-emu: nobody reads the recording %s: what it has no room for is lost\n", r->path);
+    r->told_loss = true;
+    return false;
 }
 
 /* What cannot be written is said once; the emulator goes on without. */
@@ -32,7 +57,7 @@ static void check(recorder *r, bool done)
 
 static void set(recorder *r, const char *name, const char *key, const char *value)
 {
-    if (r->file != NULL)
+    if (r->file != NULL && has_room(r))
         check(r, dr_record_set(r->file, name, key, value));
 }
 
@@ -107,6 +132,11 @@ void recorder_introduce(recorder *r, const char *name, const instrument *ins)
     set(r, name, "pace", ins->is_paced ? "on" : "off");
 }
 
+static bool is_kept(observed_kind what)
+{
+    return what != OBSERVED_NOTE && what != OBSERVED_TTY && what != OBSERVED_END;
+}
+
 static void see(observer *o, const observation *seen)
 {
     recorder *const r = (recorder *)o;
@@ -117,6 +147,16 @@ static void see(observer *o, const observation *seen)
         r->epoch_ns = seen->real_ns;
     }
     const uint64_t real_us = (seen->real_ns - r->epoch_ns) / NS_PER_US;
+    if (!is_kept(seen->what) || !has_room(r))
+        return;
+    if (r->lost > 0) {
+        char text[64];
+        (void)snprintf(text, sizeof text, "%u lines are lost here, nobody took them", (unsigned)r->lost);
+        r->lost = 0;
+        check(r, dr_record_event(r->file, seen->when_us, real_us, seen->name, text));
+    }
+    if (r->file == NULL)
+        return;
     switch (seen->what) {
     case OBSERVED_FROM_HOST:
         check(r, dr_record_bytes(r->file, seen->when_us, real_us, seen->name, DR_RECORD_FROM_HOST, seen->bytes,
@@ -143,6 +183,9 @@ static void see(observer *o, const observation *seen)
 
 void recorder_close(recorder *r)
 {
+    if (r->file != NULL && r->lost > 0)
+        (void)fprintf(stderr, "dryrig-emu: %s is incomplete: nobody took its last %u lines\n", r->path,
+                      (unsigned)r->lost);
     if (r->file != NULL && fclose(r->file) != 0)
         (void)fprintf(stderr, "dryrig-emu: %s is incomplete: %s\n", r->path, strerror(errno));
     r->file = NULL;

@@ -1,5 +1,6 @@
 /* record: an observer that writes what went over the line into a recording (dr_record.h).
  *
+ * A pipe that nobody reads does not hold the controller up: what it has no room for is lost, and the recording says how much.
  * Thread-safety: one thread at a time per recorder. */
 #ifndef RECORD_H
 #define RECORD_H
@@ -14,9 +15,12 @@ typedef struct {
     const char *path; /* for messages */
     uint64_t epoch_ns;
     bool has_begun;
+    bool is_file;  /* which always has room */
+    uint32_t lost; /* lines that nobody took, since one was */
+    bool told_loss;
 } recorder;
 
-/* False: errno says why. */
+/* A pipe may wait for its reader. False: errno says why. */
 bool recorder_open(recorder *r, const char *path);
 /* What a controller is at the beginning: called once for each, when it is set up and before anything has happened. */
 void recorder_introduce(recorder *r, const char *name, const instrument *ins);

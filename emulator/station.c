@@ -165,6 +165,13 @@ void station_run(station *s, uint64_t now_us, uint64_t now_ns)
         if (count > 0)
             send_to_host(s, bytes, count);
     }
+    if (s->ins.controller.state == DR_STATE_WEDGED && !s->told_wedge) {
+        s->told_wedge = true;
+        (void)fprintf(stderr,
+                      "dryrig-emu: %s hangs, as real ones have done: it is silent until its power is cycled ('power "
+                      "cycle' on the control channel)\n",
+                      s->name);
+    }
 }
 
 static bool is_same_tty(const struct termios *a, const struct termios *b)

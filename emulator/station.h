@@ -30,6 +30,7 @@ struct station {
     bool has_unread;             /* the kernel holds bytes that the line had no room for */
     bool wants_write;            /* waits for the host to read */
     bool told_loss;
+    bool told_wedge;
     uint64_t late_us;   /* as late_us() said then */
     uint64_t read_ns;   /* when the host's last bytes came */
     uint64_t now_ns;    /* real time, as the last call said */
