@@ -740,6 +740,20 @@ static void row_57_bytes_that_nobody_asked_for(void)
     }
 }
 
+static void noise_is_counted_on_while_motions_are_rationed(void)
+{
+    bench_armed_trio();
+    host_line(15, 40008, 40000, 40000);
+    run_ms(5);
+    run_until_state(DR_GUARD_IDLE, 40); /* one more motion is granted 50 ms after it began */
+    for (int i = 0; i < 16; i++)
+        device_says("?", 1);
+    run_ms(60);
+    expect_state(DR_GUARD_IDLE);
+    device_says("?", 1);
+    expect_fault(DR_FAULT_DEVICE_NOISE);
+}
+
 static void noise_while_it_moves_stops(void)
 {
     bench_armed_trio();
@@ -944,6 +958,7 @@ int main(void)
     RUN_TEST(row_55_a_knob_is_no_faster_than_a_knob);
     RUN_TEST(row_56_the_pause_that_the_controller_needs);
     RUN_TEST(row_57_bytes_that_nobody_asked_for);
+    RUN_TEST(noise_is_counted_on_while_motions_are_rationed);
     RUN_TEST(noise_while_it_moves_stops);
     RUN_TEST(row_83_position_replies_of_13_bytes);
     RUN_TEST(row_84_filler_during_a_long_move);

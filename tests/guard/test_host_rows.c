@@ -50,6 +50,22 @@ static void row_18_a_frame_cut_off_anywhere_is_dropped_and_the_next_works(void)
     }
 }
 
+static void row_18_after_a_frame_cut_off_the_host_must_pause(void)
+{
+    armed_trio();
+    host_code('S');
+    run_ms(101);
+    const uint32_t before = rig.wire_count;
+    host_code('C');
+    run_ms(20);
+    TEST_ASSERT_EQUAL(before, rig.wire_count);
+    run_ms(60);
+    TEST_ASSERT_EQUAL(DR_REASON_RESYNC, last_record(DR_EVENT_DROPPED)->code);
+    host_code('C');
+    run_ms(20);
+    TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
+}
+
 static void row_18_a_frame_that_trickles_is_dropped_after_300_ms(void)
 {
     uint8_t frame[14];
@@ -595,6 +611,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(row_18_a_frame_cut_off_anywhere_is_dropped_and_the_next_works);
+    RUN_TEST(row_18_after_a_frame_cut_off_the_host_must_pause);
     RUN_TEST(row_18_a_frame_that_trickles_is_dropped_after_300_ms);
     RUN_TEST(row_19_a_byte_too_many_is_caught);
     RUN_TEST(row_20_a_lost_byte_never_lets_the_next_command_complete_the_frame);
