@@ -241,7 +241,29 @@ static void take_request(player *p, const item *request)
     p->now_us = machine_us();
 }
 
-/* Is there a whole request? */
+/* Who has opened and closed the port. */
+static void read_hints(player *p)
+{
+    char hints[4096];
+    ssize_t length;
+    while ((length = read(p->inotify, hints, sizeof hints)) > 0) {
+        struct inotify_event hint;
+        for (const char *at = hints; at < hints + length; at += sizeof hint + hint.len) {
+            memcpy(&hint, at, sizeof hint);
+            if (hint.wd == p->port.watch)
+                pty_hint(&p->port, hint.mask);
+        }
+    }
+    if (!p->was_opened && (p->port.opens > 0 || p->port.was_left)) {
+        p->was_opened = true;
+        p->now_us = machine_us();
+        p->then_us = p->count > 0 ? p->items[0].when_us : 0;
+    }
+    pty_look(&p->port);
+}
+
+/* Is there a whole request? Who has opened or closed the port has done so before the bytes that are there now, and what is on
+ * its way to a host that has gone must not meet the answer to the next. */
 static bool listen_to(player *p, item *out)
 {
     for (;;) {
@@ -254,6 +276,7 @@ static bool listen_to(player *p, item *out)
         p->chunk_count = pty_read(&p->port, p->chunk, sizeof p->chunk);
         if (p->chunk_count == 0)
             return false;
+        read_hints(p);
     }
 }
 
@@ -281,27 +304,6 @@ static void play(player *p)
         (void)pty_put(&p->port, next->bytes, next->count);
         p->at++;
     }
-}
-
-/* Who has opened and closed the port. */
-static void read_hints(player *p)
-{
-    char hints[4096];
-    ssize_t length;
-    while ((length = read(p->inotify, hints, sizeof hints)) > 0) {
-        struct inotify_event hint;
-        for (const char *at = hints; at < hints + length; at += sizeof hint + hint.len) {
-            memcpy(&hint, at, sizeof hint);
-            if (hint.wd == p->port.watch)
-                pty_hint(&p->port, hint.mask);
-        }
-    }
-    if (!p->was_opened && (p->port.opens > 0 || p->port.was_left)) {
-        p->was_opened = true;
-        p->now_us = machine_us();
-        p->then_us = p->count > 0 ? p->items[0].when_us : 0;
-    }
-    pty_look(&p->port);
 }
 
 static void wait_for_something(player *p)

@@ -108,7 +108,6 @@ class Playback(unittest.TestCase):
         status, err = program.end()
         self.assertEqual(0, status, err)
         self.assertIn("mpc: 0 of the host's 3 requests differ, 0 of the recording were not made.", err)
-        self.assertFalse(os.path.exists(program.port))
 
     def test_not_before_their_time(self):
         for options, least_s in (((), 0.2), (("--speedup", "4"), 0.05)):
@@ -270,9 +269,12 @@ class Small(unittest.TestCase):
         program = Program("mpc", "--quirks", "s-needs-pause")
         host = Host(program.port)
         os.write(host.fd, b"S\x0f" + bytes(12) + b"C" * 20)
-        self.assertEqual([], select.select([host.fd], [], [], 0.3)[0])
+        while b"mpc hangs" not in program.process.stderr.readline():
+            self.assertIsNone(program.process.poll())
+        os.write(host.fd, b"C" * 20)
+        self.assertEqual([], select.select([host.fd], [], [], 0.1)[0])
         host.close()
-        self.assertEqual(1, program.end(signal.SIGTERM)[1].count("mpc hangs"))
+        self.assertNotIn("hangs", program.end(signal.SIGTERM)[1])
 
     def test_short_help(self):
         texts = [subprocess.run([EMULATOR, option], capture_output=True, timeout=LIMIT_S, check=True).stdout
