@@ -57,7 +57,8 @@ static actor *actor_of(play *p, const char *name)
     for (unsigned i = 0; i < p->count; i++)
         if (strcmp(p->actors[i]->name, name) == 0)
             return p->actors[i];
-    actor **const more = realloc(p->actors, (p->count + 1u) * sizeof *more);
+    actor **const more =
+        realloc(p->actors, (p->count + 1u) * sizeof *more); /* NOLINT(bugprone-sizeof-expression): pointers they are */
     if (more == NULL)
         return NULL;
     p->actors = more;

@@ -1,6 +1,7 @@
 #include "dr_record.h"
 
 #include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #define US_PER_S UINT64_C(1000000)
@@ -146,7 +147,7 @@ static bool read_name(dr_record_reader *reader, const char *word, dr_record *out
 {
     if (*word == '\0' || strlen(word) >= sizeof out->name)
         return wrong(reader, "a controller's name is missing, or longer than %u characters", DR_RECORD_NAME - 1u);
-    (void)strcpy(out->name, word);
+    (void)snprintf(out->name, sizeof out->name, "%s", word);
     return true;
 }
 
@@ -158,8 +159,8 @@ static bool read_setting(dr_record_reader *reader, char *at, dr_record *out)
     const char *const key = next_word(&at);
     if (*key == '\0' || strlen(key) >= sizeof out->key || *at == '\0')
         return wrong(reader, "expected: set NAME KEY VALUE");
-    (void)strcpy(out->key, key);
-    (void)strcpy(out->text, at);
+    (void)snprintf(out->key, sizeof out->key, "%s", key);
+    (void)snprintf(out->text, sizeof out->text, "%s", at);
     return true;
 }
 
@@ -178,7 +179,7 @@ static bool read_line(dr_record_reader *reader, char *at, dr_record *out)
     out->kind = (uint8_t)kind[0];
     if (out->kind != DR_RECORD_EVENT)
         return read_bytes(reader, at, out);
-    (void)strcpy(out->text, at);
+    (void)snprintf(out->text, sizeof out->text, "%s", at);
     return true;
 }
 

@@ -213,7 +213,8 @@ static int decode_hex(const command_line *line, const char *text)
         }
         if (at[0] == '0' && (at[1] == 'x' || at[1] == 'X'))
             at += 2;
-        char digits[3] = {at[0], at[0] != '\0' ? at[1] : '\0', '\0'};
+        const char second = at[0] == '\0' ? '\0' : at[1];
+        const char digits[3] = {at[0], second, '\0'};
         char *end;
         const unsigned long byte = strtoul(digits, &end, 16);
         if (end != digits + 2)

@@ -149,8 +149,8 @@ static double resident_mib(pid_t pid)
     (void)snprintf(path, sizeof path, "/proc/%d/status", (int)pid);
     FILE *const file = fopen(path, "r");
     while (file != NULL && fgets(line, sizeof line, file) != NULL)
-        if (sscanf(line, "VmRSS: %lf", &kib) == 1)
-            break;
+        if (strncmp(line, "VmRSS:", 6) == 0)
+            kib = strtod(line + 6, NULL);
     if (file != NULL)
         (void)fclose(file);
     return kib / 1024;
@@ -206,7 +206,8 @@ static void many_controllers(char *emulator, unsigned rounds)
         ask_all(&floor_, rounds / TURNS + 1);
         ask_all(&rigged, rounds / TURNS + 1);
     }
-    const double asked = (double)PORTS * TURNS * (rounds / TURNS + 1);
+    const unsigned asked_each = rounds / TURNS + 1;
+    const double asked = (double)PORTS * TURNS * asked_each;
     (void)printf("                                       floor dryrig-emu    ratio\n");
     (void)printf("commands a second, 64 ports     %12.0f %10.0f %8.2f\n", asked / floor_.spent_s,
                  asked / rigged.spent_s, floor_.spent_s / rigged.spent_s);
