@@ -136,6 +136,13 @@ static void tell_note(trace *t, const observation *seen)
 
 static void tell_json(trace *t, const observation *seen)
 {
+    if (!has_room(t)) {
+        t->lost++;
+        return;
+    }
+    if (t->lost > 0)
+        (void)fprintf(t->file, "{\"lost_lines\":%u}\n", (unsigned)t->lost);
+    t->lost = 0;
     cJSON *const object = observe_json(seen);
     char *const text = cJSON_PrintUnformatted(object);
     if (text == NULL || fprintf(t->file, "%s\n", text) < 0)

@@ -92,7 +92,7 @@ typedef struct {
     uint32_t home_steps[DR_AXES]; /* TRIO */
     dr_notes *notes;              /* where events go; NULL: nowhere */
 
-    /* to be read by anybody, written by dr_controller only */
+    /* to be read by anybody, written by dr_controller only (but a fault injector may shorten `leg` just after it began) */
     uint8_t state;                                     /* dr_state */
     uint8_t active;                                    /* index of the drive that commands act on */
     bool streaming;                                    /* 'O' */
