@@ -213,8 +213,9 @@ static int decode_hex(const command_line *line, const char *text)
         }
         if (at[0] == '0' && (at[1] == 'x' || at[1] == 'X'))
             at += 2;
-        const char second = at[0] == '\0' ? '\0' : at[1];
-        const char digits[3] = {at[0], second, '\0'};
+        char digits[3] = {at[0], '\0', '\0'};
+        if (at[0] != '\0')
+            digits[1] = at[1];
         char *end;
         const unsigned long byte = strtoul(digits, &end, 16);
         if (end != digits + 2)
