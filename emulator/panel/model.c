@@ -1,5 +1,6 @@
 #include "model.h"
 
+#include "dr_wire.h"  /* dr_wire_put_reply */
 #include "dr_words.h" /* names of stages and controllers */
 
 #include <cjson/cJSON.h>
@@ -271,11 +272,15 @@ const model_entry *model_entry_at(const model *m, unsigned n)
 void model_position_answer(const model *m, char out[64])
 {
     const model_device *const d = model_active(m);
-    size_t length = m->kind == DR_TRIO ? 0 : (size_t)snprintf(out, 64, "%02X ", m->active + 1u);
+    const bool is_trio = m->kind == DR_TRIO;
+    dr_reply reply = {.value = (uint8_t)(is_trio ? m->angle_deg : m->active + 1u)};
     for (unsigned axis = 0; axis < DR_AXES; axis++)
-        for (unsigned byte = 0; byte < 4; byte++)
-            length += (size_t)snprintf(out + length, 64 - length, "%02X ", d->at_steps[axis] >> 8 * byte & 0xFFu);
-    if (m->kind == DR_TRIO)
-        length += (size_t)snprintf(out + length, 64 - length, "%02X ", m->angle_deg & 0xFFu);
-    (void)snprintf(out + length, 64 - length, "0D");
+        reply.steps[axis] = d->at_steps[axis];
+    dr_command query; /* the same in every firmware */
+    uint8_t bytes[DR_REPLY_MAX];
+    size_t length = 0;
+    (void)dr_command_for(m->kind, DR_FIRMWARE_FIRST, is_trio ? DR_OP_TRIO_POSITION : DR_OP_MPC_POSITION, &query);
+    const size_t count = dr_wire_put_reply(&query, &reply, bytes);
+    for (size_t i = 0; i < count; i++)
+        length += (size_t)snprintf(out + length, 64 - length, i == 0 ? "%02X" : " %02X", bytes[i]);
 }

@@ -44,6 +44,7 @@ typedef enum { DR_TRIO, DR_MPC } dr_kind; /* TRIO MP-245A; MPC-200 (the controll
 
 #define DR_CR 0x0Du /* the task-complete indicator [T note 1, M note 1] */
 #define DR_LF 0x0Au
+#define DR_INTERRUPT 0x03u     /* ^C [T table 6, M table 9] */
 #define DR_NO_SUCH_DRIVE 0x45u /* 'E', the answer of 'I' for a drive that is not there [M table 9] */
 
 /* -- Commands ------------------------------------------------------------------------------------------------------ */

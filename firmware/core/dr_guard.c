@@ -60,8 +60,7 @@ typedef enum {
 #define WIRING_US MS(50)
 #define RELEASE_US MS(20)
 #define RAW_STOPS_MAX 15u /* ^C that wait to leave */
-#define CTRL_C 0x03u
-#define EVENTS_MAX 16u /* at most so many in one call; a caller who comes that late is due again at once */
+#define EVENTS_MAX 16u    /* at most so many in one call; a caller who comes that late is due again at once */
 
 /* -- Small helpers ------------------------------------------------------------------------------------------------- */
 
@@ -976,7 +975,7 @@ static void pass_stop(dr_guard *g, dr_us now, const dr_command *command)
 static void stop_by_host(dr_guard *g, dr_us now)
 {
     if (g->task == TASK_STOP && g->stop_owed >= HOST_STOPS_MAX && is_running(g, DR_TIMER_PROOF)) {
-        drop(g, now, DR_REASON_BUSY, CTRL_C); /* their answers would keep rest from being proved */
+        drop(g, now, DR_REASON_BUSY, DR_INTERRUPT); /* their answers would keep rest from being proved */
     } else if (g->task == TASK_STOP) {
         if (g->stop_owed < UINT8_MAX)
             g->stop_owed++;
@@ -1046,14 +1045,14 @@ static void push_host_byte(dr_guard *g, dr_us now, uint8_t byte)
 {
     dr_command command = {0, 0, 0, 0, 0, 0, 0};
     if (g->limits == NULL) {
-        if (byte == CTRL_C)
+        if (byte == DR_INTERRUPT)
             send_stop(g, now, DR_STOP_HOST);
         else
             drop(g, now, DR_REASON_NOT_ARMED, byte);
         return;
     }
     const bool busy = g->task != TASK_NONE && g->task != TASK_PASS;
-    if (byte == CTRL_C && busy) { /* at any offset: a stop too many is cheap */
+    if (byte == DR_INTERRUPT && busy) { /* at any offset: a stop too many is cheap */
         stop_by_host(g, now);
         if (g->framer.have == 0)
             return;
@@ -1272,7 +1271,7 @@ size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room)
     while (count < room) { /* at most room times */
         if (g->stops_out > 0 && !is_leaving(g)) {
             g->stops_out--;
-            bytes[count++] = CTRL_C;
+            bytes[count++] = DR_INTERRUPT;
         } else if (g->out_at < g->out_ready) {
             bytes[count++] = g->out[g->out_at++];
             if (g->out_at == g->out_count)

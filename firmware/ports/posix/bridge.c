@@ -23,7 +23,6 @@
 #define REST_US (3 * S_US)          /* at the end; then it is left as it is */
 #define STEP_US (UINT64_C(1) << 30) /* the guard tells instants apart up to 2^31 us */
 #define CHUNK 256u
-#define CTRL_C 0x03u
 
 enum { FD_SIGNALS, FD_INOTIFY, FD_HOST, FD_DEVICE, FD_CONTROL, FDS = FD_CONTROL + CONTROL_FDS };
 
@@ -80,7 +79,7 @@ static void lose_device(bridge *b, const char *why)
 static bool is_stop(const uint8_t *bytes, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        if (bytes[i] != CTRL_C)
+        if (bytes[i] != DR_INTERRUPT)
             return false;
     return true;
 }
