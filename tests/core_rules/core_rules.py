@@ -3,8 +3,8 @@ unbounded loop, call through a pointer, or memory of its own; modules depend one
 
     core_rules.py DIRECTORY [--cc GCC]
 
-DIRECTORY holds the modules (*.c, *.h) and the CMakeLists.txt whose dr_core_module(NAME USES...) lines say which module
-may use which. Prints one line a violation, file:line: rule: what, and exits with 1 if there is one, with 2 if it could
+DIRECTORY holds the modules (*.c, *.h) and the CMakeLists.txt whose dr_core_module(NAME USES... [ROOMS FILES...]) say which
+module may use which, and which rooms a module has: each may use the rooms before it. NAME_rooms.h is the rooms' own. Prints one line a violation, file:line: rule: what, and exits with 1 if there is one, with 2 if it could
 not check. Words are looked for everywhere, comments included, so that a plain grep says the same.
 """
 import argparse
@@ -84,29 +84,40 @@ def loops(text, code):
             yield found.start(), "loop", "no bound in sight: state it on this line, /* at most ... */"
 
 
-def includes(path, text, own, may_use):
+def includes(path, text, own, may_include):
     for found in re.finditer(r"^[ \t]*#[ \t]*include[ \t]+(\S+)", text, re.M):
         name = found.group(1).strip('<>"')
         if found.group(1) == "DR_ROM_HEADER" or name in ALLOWED_HEADERS:
             continue
         if name not in own:
             yield found.start(), "include", f"{name}: only {', '.join(sorted(ALLOWED_HEADERS))} and the core's own"
-        elif Path(name).stem != path.stem and Path(name).stem not in may_use.get(path.stem, set()):
+        elif Path(name).stem != path.stem and Path(name).stem not in may_include.get(path.stem, set()):
             yield found.start(), "layer", f"{path.stem} may not use {Path(name).stem} (see CMakeLists.txt)"
 
 
 def layers(directory):
-    """Which modules each module may use, itself not counted; as the build has it."""
-    uses = {}
+    """Which files each file may call and which headers it may include, itself not counted; as the build has it."""
+    uses, rooms = {}, {}
     lists = directory / "CMakeLists.txt"
     for name, rest in re.findall(r"^dr_core_module\((\w+)([^)]*)\)", lists.read_text(), re.M):
-        uses[name] = set(rest.split())
+        used, _, inside = rest.partition("ROOMS")
+        uses[name], rooms[name] = set(used.split()), inside.split()
     if not uses:
         raise CannotCheck(f"{lists}: no dr_core_module(NAME USES...)")
     for _ in uses:
         for name in uses:
             uses[name] = uses[name].union(*(uses.get(other, set()) for other in uses[name]))
-    return uses
+    may_call, may_include = dict(uses), dict(uses)
+    for name in uses:
+        header = f"{name}_rooms"
+        if rooms[name]:
+            may_call[name] = uses[name] | set(rooms[name])
+            may_include[name] = uses[name] | {header}
+            may_include[header] = uses[name] | {name}
+        for at, room in enumerate(rooms[name]):
+            may_call[room] = uses[name] | set(rooms[name][:at])
+            may_include[room] = uses[name] | {name, header}
+    return may_call, may_include
 
 
 def run(*command):
@@ -116,7 +127,7 @@ def run(*command):
     return done.stdout
 
 
-def objects(sources, directory, cc, may_use):
+def objects(sources, directory, cc, may_call):
     """What only the compiler knows: calls, symbols."""
     calls, defined, undefined = {}, {}, {}
     with tempfile.TemporaryDirectory() as temporary:
@@ -143,7 +154,7 @@ def objects(sources, directory, cc, may_use):
     for source, names in undefined.items():
         for name in sorted(names - ALLOWED_LIBRARY):
             if name in defined:
-                if defined[name].stem not in may_use.get(source.stem, set()):
+                if defined[name].stem not in may_call.get(source.stem, set()):
                     yield source, 0, "layer", f"{source.stem} may not call {name} of {defined[name].stem} (see CMakeLists.txt)"
             elif not COMPILERS_OWN.match(name):
                 yield source, 0, "symbol", f"{name} is not the core's (allowed: {', '.join(sorted(ALLOWED_LIBRARY))})"
@@ -174,17 +185,17 @@ def violations(directory, cc):
     sources = [path for path in files if path.suffix == ".c"]
     if not sources:
         raise CannotCheck(f"{directory}: no *.c")
-    may_use = layers(directory)
+    may_call, may_include = layers(directory)
     own = {path.name for path in files}
     for path in files:
         text = path.read_text()
         code = code_only(text)
-        if path.stem not in may_use:
+        if path.stem not in may_include:
             yield path, 1, "layer", "not a dr_core_module() of CMakeLists.txt"
-        for found in (words(text, code), directives(text, code), loops(text, code), includes(path, text, own, may_use)):
+        for found in (words(text, code), directives(text, code), loops(text, code), includes(path, text, own, may_include)):
             for offset, rule, what in found:
                 yield path, line_of(text, offset), rule, what
-    yield from objects(sources, directory, cc, may_use)
+    yield from objects(sources, directory, cc, may_call)
 
 
 def main():

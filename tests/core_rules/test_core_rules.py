@@ -84,6 +84,21 @@ class CoreRules(unittest.TestCase):
         (self.core / "dr_more.c").write_text('#include "dr_device.h"\n')
         self.assertIn("dr_more.c:1: layer: ", self.check().stdout)
 
+    def test_rooms(self):
+        with open(self.core / "CMakeLists.txt", "a") as file:
+            file.write("dr_core_module(dr_house dr_device ROOMS dr_house_low dr_house_high)\n")
+        for name, text in (("dr_house.h", '#include "dr_device.h"\nint dr_house(void);\n'),
+                           ("dr_house_rooms.h", '#include "dr_house.h"\nint dr_low(void);\nint dr_high(void);\n'),
+                           ("dr_house_low.c", '#include "dr_house_rooms.h"\nint dr_low(void) { return 1; }\n'),
+                           ("dr_house_high.c", '#include "dr_house_rooms.h"\nint dr_high(void) { return dr_low(); }\n'),
+                           ("dr_house.c", '#include "dr_house_rooms.h"\nint dr_house(void) { return dr_high(); }\n')):
+            (self.core / name).write_text(text)
+        self.test_the_copy_as_it_is()
+        self.caught("layer", "int dr_up(void);\nint dr_up(void) { return dr_high(); }", "dr_house_low.c")
+        self.caught("layer", "int dr_top(void);\nint dr_top(void) { return dr_house(); }", "dr_house_high.c")
+        self.caught("layer", '#include "dr_wire.h"', "dr_house_low.c")
+        self.caught("layer", '#include "dr_house_rooms.h"')
+
     def test_loops(self):
         for head in ("while (1)", "for (;;)", "while (true)", "for (int i = 0;; i++)", "while (n > 0)", "for (; n; n = n / 2)"):
             self.caught("loop", f"int dr_loop(int n);\nint dr_loop(int n) {{ {head} {{ n--; }} return n; }}")

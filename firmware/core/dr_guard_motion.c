@@ -1,0 +1,118 @@
+/* One motion: from the reading before it to the proof of its end. See dr_guard_rooms.h. */
+#include "dr_guard_rooms.h"
+
+#define SMALL_MOVE_US MS(100) /* 15 microsteps at the slowest speed take 15 ms */
+#define SMALL_MOVE_STEPS 16u  /* an MPC-200 ignores shorter moves, without a CR ([P], small-move-silent) */
+#define CALIBRATION_US MS(60000)
+
+/* How long the motion may last at most: one and a half times its way at the slowest plausible speed, and 2 s. */
+dr_us dr_g_longest_us(const dr_guard *g)
+{
+    if (g->small)
+        return SMALL_MOVE_US;
+    if (is_calibration(g->command.op))
+        return CALIBRATION_US;
+    const bool line = g->command.op == DR_OP_TRIO_LINE || g->command.op == DR_OP_MPC_LINE;
+    uint64_t way_q = 0;
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        const int32_t down = g->path.line.from_q[axis] - g->path.target_q.min_q[axis];
+        const int32_t up = g->path.target_q.max_q[axis] - g->path.line.from_q[axis];
+        way_q += (uint64_t)(up > down ? up : down);
+    }
+    const uint64_t speed = dr_judge_speed(g->limits, g->path_drive, line ? g->request.value : DR_SPEED_FULL, false);
+    const uint64_t lasts_us = way_q * 3u * (DR_US_PER_S / 2u) / speed + MS(2000);
+    return (dr_us)
+        lasts_us; /* the longest: 87.5 mm in all (MP-865) at 81 um/s, 27 minutes; instants are told apart up to 35 */
+}
+
+static bool is_small(const dr_guard *g)
+{
+    if (kind_of(g) == DR_TRIO || (g->command.is & DR_IS_TARGETED) == 0)
+        return false;
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        if (dr_g_apart(g->request.steps[axis], g->scene.start_steps[axis]) >= SMALL_MOVE_STEPS)
+            return false;
+    return true;
+}
+
+void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply)
+{
+    const bool jumped = dr_g_has_jumped(g, now, reply);
+    dr_g_know_place(g, now, reply);
+    if (jumped) {
+        dr_g_refuse_pending(g, now, dr_g_because(DR_REASON_NO_POSITION));
+        dr_g_fail(g, now, DR_FAULT_POSITION_JUMP);
+        return;
+    }
+    if (!dr_g_is_intact(g)) {
+        dr_g_fall_back(g, now);
+        return;
+    }
+    g->scene.may_calibrate = is_on(g, DR_INPUT_MAY_CALIBRATE);
+    g->scene.in_tissue = is_on(g, DR_INPUT_IN_TISSUE);
+    const dr_verdict verdict = dr_judge_motion(g->limits, &g->scene, &g->command, &g->request);
+    if (verdict.reason != DR_REASON_NONE) {
+        dr_g_end_task(g);
+        dr_g_refuse_pending(g, now, verdict);
+        return;
+    }
+    g->path = dr_judge_path(g->limits, &g->scene, &g->command, &g->request);
+    g->path_drive = g->scene.drive;
+    g->small = is_small(g);
+    g->end_told = false;
+    g->forwarded++;
+    g->tokens--;
+    if (!is_running(g, DR_TIMER_RATE))
+        dr_g_set_timer(g, DR_TIMER_RATE, now + RATE_US);
+    const uint8_t length = (uint8_t)(1u + g->command.args);
+    dr_g_put_out(g, g->frame, length, 0);
+    dr_g_set_timer(g, DR_TIMER_SEND, now + FRAME_GAP_US);
+    dr_g_start_idling(g, now);
+    g->task = TASK_SEND;
+    dr_g_log_bytes(g, now, DR_EVENT_ALLOWED, 0, g->command.op, g->frame, length);
+}
+
+/* Where the motion may rightly end: at its target; without Y where homing leaves it out; where it began, if it was so short
+ * that the controller ignores it. */
+static bool is_at_an_end(const dr_guard *g, const dr_reply *reply)
+{
+    dr_box without_y = g->path.target_q;
+    without_y.min_q[DR_Y] = without_y.max_q[DR_Y] = g->path.line.from_q[DR_Y];
+    const dr_segment stays = {{g->path.line.from_q[DR_X], g->path.line.from_q[DR_Y], g->path.line.from_q[DR_Z]},
+                              {g->path.line.from_q[DR_X], g->path.line.from_q[DR_Y], g->path.line.from_q[DR_Z]}};
+    const dr_box start = dr_box_around(&stays);
+    const bool homes = g->command.op == DR_OP_TRIO_HOME || g->command.op == DR_OP_TRIO_HOME_TO;
+    return dr_g_is_at(g, reply, &g->path.target_q) ||
+           (homes && has_rig(g, DR_RIG_Y_LOCKED_OUT) && dr_g_is_at(g, reply, &without_y)) ||
+           (g->small && dr_g_is_at(g, reply, &start));
+}
+
+void dr_g_read_for_end(dr_guard *g, dr_us now, const dr_reply *reply)
+{
+    bool agree = true;
+    if (is_at_an_end(g, reply)) {
+        dr_g_know_place(g, now, reply);
+        dr_g_end_task(g);
+        for (uint8_t drive = 0; drive < DR_PORTS; drive++)
+            g->scene.old[drive].is_open = false;
+        if (is_calibration(g->command.op))
+            g->scene.frame_lost = false;
+        if (g->end_told)
+            dr_g_put_host(g, DR_CR);
+        dr_g_log_event(g, now, DR_EVENT_ENDED, g->command.op, DR_NO_ITEM);
+        return;
+    }
+    if (!dr_g_has_two(g, now, reply, &agree))
+        return;
+    dr_g_know_place(g, now, reply);
+    if (!agree) {
+        dr_g_begin_stop(g, now, DR_STOP_EARLY_CR, DR_FAULT_EARLY_CR, 0);
+        dr_g_latch(g, DR_FAULT_EARLY_CR);
+        return;
+    }
+    const dr_old_move *old = &g->scene.old[g->path_drive];
+    const bool resumed = old->is_open && dr_g_is_at(g, reply, &old->target_q);
+    dr_g_keep_old_target(g);
+    dr_g_end_task(g);
+    dr_g_latch(g, resumed ? DR_FAULT_RESUMED_OLD_MOVE : DR_FAULT_WRONG_END);
+}
