@@ -1,5 +1,6 @@
 /* emulator: the emulated controller on a board. A board's main() calls dr_emulator_begin() once and then dr_emulator_step()
- * for ever; everything else it needs to provide is in port.h. */
+ * for ever; everything else it needs to provide is in port.h. A board with buttons calls dr_hands_begin() and dr_hands_step()
+ * of hands.h instead. */
 #ifndef DR_EMULATOR_H
 #define DR_EMULATOR_H
 
@@ -14,6 +15,15 @@ void dr_emulator_begin(void);
 /* What there is to do now, and then dr_port_wait(). */
 void dr_emulator_step(void);
 const dr_controller *dr_emulator_controller(void);
+
+/* -- The same in pieces, for hands.c ------------------------------------------------------------------------------- */
+
+/* All of dr_emulator_begin() but the power switch. */
+dr_controller *dr_emulator_prepare(void);
+/* dr_emulator_step() at this instant; where `has_end` says so, the wait ends at `until` at the latest. */
+void dr_emulator_loop(dr_us now, bool has_end, dr_us until);
+/* Something that is kept without power may have changed. */
+void dr_emulator_touch(dr_us now);
 
 #ifdef __cplusplus
 }

@@ -99,16 +99,16 @@ static void sooner(bool also, dr_us other, bool *has_end, dr_us *until)
     *has_end = *has_end || also;
 }
 
-void dr_emulator_step(void)
+void dr_emulator_loop(dr_us now, bool has_end, dr_us until)
 {
-    const dr_us now = dr_port_now_us();
-    dr_us until = now, other;
+    dr_us other;
     if (dr_controller_ready(&controller) == 0) {
         line_at = now;
         line_at_ns = 0;
     }
     hear(now);
-    bool has_end = tell(now, &until);
+    const bool tells = tell(now, &other);
+    sooner(tells, other, &has_end, &until);
     const bool keeps = dr_keep_step(&keep, &controller, now, &other);
     if (!dr_port_waits())
         return;
@@ -118,7 +118,15 @@ void dr_emulator_step(void)
     dr_port_wait(has_end, until);
 }
 
-void dr_emulator_begin(void)
+void dr_emulator_step(void)
+{
+    const dr_us now = dr_port_now_us();
+    dr_emulator_loop(now, false, now);
+}
+
+void dr_emulator_touch(dr_us now) { dr_keep_touch(&keep, now); }
+
+dr_controller *dr_emulator_prepare(void)
 {
     const uint8_t straps = dr_port_begin();
     const dr_kind built_for = EMULATOR_KIND;
@@ -126,7 +134,6 @@ void dr_emulator_begin(void)
     const uint8_t set = (uint8_t)((straps & DR_STRAP_STAGES) >> DR_STRAP_STAGES_SHIFT);
     const uint8_t *stages = is_trio ? trio_stages[set] : mpc_stages[set];
     const uint32_t baud = is_trio ? DR_BAUD_TRIO : DR_BAUD_MPC;
-    const dr_hand power_on = {.what = DR_HAND_POWER_ON};
 
     for (uint8_t i = 0; i < DR_PORTS; i++)
         dr_drive_init(&drives[i], (dr_stage_id)stages[i]);
@@ -136,6 +143,12 @@ void dr_emulator_begin(void)
     byte_ns = UINT32_C(1000000000) / (baud / DR_BITS_PER_BYTE);
     dr_port_open(baud);
     heard = dr_port_now_us();
-    (void)dr_controller_poke(&controller, heard, &power_on);
     dr_keep_touch(&keep, heard);
+    return &controller;
+}
+
+void dr_emulator_begin(void)
+{
+    const dr_hand power_on = {.what = DR_HAND_POWER_ON};
+    (void)dr_controller_poke(dr_emulator_prepare(), heard, &power_on);
 }

@@ -61,6 +61,17 @@ void dr_port_write(const uint8_t *bytes, size_t count);
  * emulator_main.c keeps the controller's pace. */
 bool dr_port_has_pace(void);
 
+/* -- Inputs and outputs: what a bit means is said by the program that uses them (hands.h) ------------------------------ */
+
+#define DR_PORT_INPUTS 16u
+
+/* Which inputs are closed, that is connected to ground, at this moment; input 0 is bit 0. With all their bounce. 0: the
+ * board has none. A board that sleeps is woken to look at them. */
+uint16_t dr_port_inputs(void);
+
+/* Makes each output high whose bit is set, the others low, as all are after dr_port_begin(). */
+void dr_port_outputs(uint8_t high);
+
 /* -- Memory that survives power-off -------------------------------------------------------------------------------- */
 
 #define DR_PORT_SLOT_BYTES 100u

@@ -1,16 +1,34 @@
 /* Boards of Arduino's AVR core: Uno and Mega (the line is their first UART), Leonardo and Micro (native USB). */
 #include "emulator.h"
+#include "hands.h"
 #include "port.h"
 
 #include <Arduino.h>
 
 static const uint8_t strap_pins[] = {2, 3, 4, 5}; /* DR_STRAP_* from the lowest bit on: closed is connected to ground */
+static const uint8_t input_pins[] = {
+    6,  7,  8,   9,   10, 11, A0, A1, A2, A3, A4, A5,
+#ifdef ARDUINO_AVR_MEGA2560
+    A8, A9, A10, A11,
+#endif
+};
+static const uint8_t output_pins[] = {
+    12,
+    LED_BUILTIN,
+#ifdef ARDUINO_AVR_MEGA2560
+    22,
+#endif
+};
 
 uint8_t dr_port_begin(void)
 {
     uint8_t straps = 0;
     for (uint8_t i = 0; i < sizeof strap_pins; i++)
         pinMode(strap_pins[i], INPUT_PULLUP);
+    for (uint8_t i = 0; i < sizeof input_pins; i++)
+        pinMode(input_pins[i], INPUT_PULLUP);
+    for (uint8_t i = 0; i < sizeof output_pins; i++)
+        pinMode(output_pins[i], OUTPUT);
     delayMicroseconds(100); /* the pull-ups against the pins' capacitance */
     for (uint8_t i = 0; i < sizeof strap_pins; i++)
         if (digitalRead(strap_pins[i]) == LOW)
@@ -63,5 +81,20 @@ bool dr_port_has_pace(void) { return true; }
 
 #endif
 
-void setup() { dr_emulator_begin(); }
-void loop() { dr_emulator_step(); }
+uint16_t dr_port_inputs(void)
+{
+    uint16_t closed = 0;
+    for (uint8_t i = 0; i < sizeof input_pins; i++)
+        if (digitalRead(input_pins[i]) == LOW)
+            closed = (uint16_t)(closed | 1u << i);
+    return closed;
+}
+
+void dr_port_outputs(uint8_t high)
+{
+    for (uint8_t i = 0; i < sizeof output_pins; i++)
+        digitalWrite(output_pins[i], (high >> i & 1u) != 0 ? HIGH : LOW);
+}
+
+void setup() { EMULATOR_HANDS ? dr_hands_begin() : dr_emulator_begin(); }
+void loop() { EMULATOR_HANDS ? dr_hands_step() : dr_emulator_step(); }

@@ -29,6 +29,8 @@
 #define TIMER_INTERRUPTS 8u
 
 #define SWITCHES REGISTER(0x4002F00Cu) /* SCC CFG_REG3: the board's user switches */
+#define BUTTONS REGISTER(0x40028008u)  /* FPGAIO: the board's two user buttons; QEMU has none and says 0 */
+#define LEDS REGISTER(0x40028000u)     /* and its two user LEDs */
 #define NVIC_ENABLE REGISTER(0xE000E100u)
 
 /* -- Start --------------------------------------------------------------------------------------------------------- */
@@ -96,6 +98,11 @@ void dr_port_write(const uint8_t *bytes, size_t count)
 
 /* QEMU's UART has none. That of a chip has. */
 bool dr_port_has_pace(void) { return false; }
+
+/* -- Inputs and outputs -------------------------------------------------------------------------------------------- */
+
+uint16_t dr_port_inputs(void) { return (uint16_t)(BUTTONS & 3u); }
+void dr_port_outputs(uint8_t high) { LEDS = high & 3u; }
 
 /* -- Sleep --------------------------------------------------------------------------------------------------------- */
 

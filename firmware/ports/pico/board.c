@@ -1,5 +1,6 @@
 /* Raspberry Pi Pico (RP2040): the line is a serial port on its USB, the memory two sectors of its flash. */
 #include "emulator.h"
+#include "hands.h"
 #include "port.h"
 
 #include "hardware/flash.h"
@@ -13,9 +14,20 @@
 
 static const uint8_t strap_pins[] = {2, 3, 4, 5}; /* GP numbers; DR_STRAP_* from the lowest bit on, closed to ground */
 
+#define FIRST_INPUT 6u                         /* GP6 to GP21 */
+static const uint8_t output_pins[] = {26, 25}; /* GP26, and the LED */
+
 uint8_t dr_port_begin(void)
 {
     uint8_t straps = 0;
+    for (uint8_t pin = FIRST_INPUT; pin < FIRST_INPUT + DR_PORT_INPUTS; pin++) {
+        gpio_init(pin);
+        gpio_pull_up(pin);
+    }
+    for (uint8_t i = 0; i < sizeof output_pins; i++) {
+        gpio_init(output_pins[i]);
+        gpio_set_dir(output_pins[i], GPIO_OUT);
+    }
     for (uint8_t i = 0; i < sizeof strap_pins; i++) {
         gpio_init(strap_pins[i]);
         gpio_pull_up(strap_pins[i]);
@@ -72,6 +84,16 @@ void dr_port_write(const uint8_t *bytes, size_t count)
 
 bool dr_port_has_pace(void) { return false; }
 
+/* -- Inputs and outputs -------------------------------------------------------------------------------------------- */
+
+uint16_t dr_port_inputs(void) { return (uint16_t)(~gpio_get_all() >> FIRST_INPUT); }
+
+void dr_port_outputs(uint8_t high)
+{
+    for (uint8_t i = 0; i < sizeof output_pins; i++)
+        gpio_put(output_pins[i], (high >> i & 1u) != 0);
+}
+
 /* -- Memory: the last two sectors of the flash, a page for each slot ------------------------------------------------- */
 
 #define SECTORS 2u
@@ -103,7 +125,7 @@ bool dr_port_slot_write(uint16_t slot, const uint8_t *bytes, size_t count)
 
 int main(void)
 {
-    dr_emulator_begin();
+    EMULATOR_HANDS ? dr_hands_begin() : dr_emulator_begin();
     for (;;)
-        dr_emulator_step();
+        EMULATOR_HANDS ? dr_hands_step() : dr_emulator_step();
 }

@@ -71,6 +71,12 @@ void dr_port_write(const uint8_t *bytes, size_t count)
 /* A chip with a UART: true. */
 bool dr_port_has_pace(void) { return false; }
 
+/* A chip: the levels of its input pins, inverted. */
+uint16_t dr_port_inputs(void) { return 0; }
+
+/* A chip: the levels of its output pins. */
+void dr_port_outputs(uint8_t high) { (void)high; }
+
 /* A chip: the EEPROM, or two sectors of flash. Without either return 0; the rest is never called then. */
 uint16_t dr_port_slots(void) { return memory < 0 ? 0 : SLOTS; }
 
