@@ -80,6 +80,8 @@ static void settle(dr_guard *g, dr_us now)
     }
 }
 
+bool dr_guard_is_mid_frame(const dr_guard *g) { return is_leaving(g); }
+
 bool dr_guard_due(const dr_guard *g, dr_us *when)
 {
     uint8_t timer = 0;
@@ -196,8 +198,9 @@ void dr_guard_get_status(const dr_guard *g, dr_guard_status *out)
         if (g->unsteady)
             out->needs |= DR_NEEDS_STEADY;
         out->confirm_wanted = g->ambiguous || g->tip_changed || (g->limits->obstacle_count == 0 && !g->confirmed) ||
-                              (g->cut && g->mode == MODE_DISARMED) || g->torn;
+                              (g->cut && g->mode == MODE_DISARMED);
     }
+    out->confirm_wanted = out->confirm_wanted || g->torn;
     out->in_tissue = is_on(g, DR_INPUT_IN_TISSUE);
     out->escape = is_on(g, DR_INPUT_ESCAPE);
     out->may_calibrate = is_on(g, DR_INPUT_MAY_CALIBRATE);
@@ -231,11 +234,14 @@ void dr_guard_init(dr_guard *g, const dr_limits *limits, dr_record *ring, uint16
     g->fault = (uint8_t)(g->limits == NULL ? DR_FAULT_LIMITS : DR_FAULT_NO_DEVICE);
 }
 
-void dr_guard_start(dr_guard *g, dr_us now, bool after_reset)
+void dr_guard_start(dr_guard *g, dr_us now, dr_start how)
 {
-    dr_record record = dr_g_record_of(g, now, DR_EVENT_START, after_reset);
+    dr_record record = dr_g_record_of(g, now, DR_EVENT_START, (uint8_t)how);
     record.position_steps[0] = g->limits_crc;
     record.position_steps[1] = g->limits == NULL ? 0 : g->limits->revision;
     dr_log_put(&g->log, &record);
-    g->after_reset = after_reset;
+    g->after_reset = how == DR_START_AFTER_RESET;
+    g->torn = how == DR_START_MID_FRAME;
+    if (g->torn && g->limits != NULL)
+        g->fault = DR_FAULT_TORN;
 }

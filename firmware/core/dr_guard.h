@@ -97,7 +97,7 @@ typedef struct {
 /* -- Log ------------------------------------------------------------------------------------------------------------ */
 
 typedef enum {
-    DR_EVENT_START,       /* position[0] = dr_limits_crc, position[1] = revision; code = 1 after a watchdog reset */
+    DR_EVENT_START,       /* position[0] = dr_limits_crc, position[1] = revision; code = dr_start */
     DR_EVENT_STATE,       /* the state changed; code = dr_fault */
     DR_EVENT_ALLOWED,     /* host frame -> controller: bytes */
     DR_EVENT_REFUSED,     /* host frame refused: bytes, code = dr_reason, axis, item; position = where the tip was */
@@ -107,10 +107,10 @@ typedef enum {
     DR_EVENT_IMPLAUSIBLE, /* it was answered by nonsense: bytes */
     DR_EVENT_QUARANTINED, /* controller bytes that nobody asked for: bytes; count = how many */
     DR_EVENT_STOP,        /* ^C -> controller; code = dr_stop_cause */
-    DR_EVENT_ENDED,       /* a motion ended where it should: position */
-    DR_EVENT_NO_REPLY,    /* a host's query or setting stayed unanswered; code = dr_op */
-    DR_EVENT_INPUT,       /* code = dr_input, item = on */
-    DR_EVENT_LINK         /* code: bit 0 host open, bit 1 device present */
+    DR_EVENT_ENDED, /* a motion ended where it should: position, item = drive, code = dr_op; bytes: its CR, if it came */
+    DR_EVENT_NO_REPLY, /* a host's query or setting stayed unanswered; code = dr_op */
+    DR_EVENT_INPUT,    /* code = dr_input, item = on */
+    DR_EVENT_LINK      /* code: bit 0 host open, bit 1 device present */
 } dr_event;
 
 typedef enum {
@@ -228,15 +228,26 @@ typedef struct {
 /* A guard of these limits, which stay the caller's and must not change; NULL or limits that dr_limits_check() refuses:
  * LOCKED for good. ring: memory of the log, at least one record; NULL or size 0: never arms. */
 void dr_guard_init(dr_guard *g, const dr_limits *limits, dr_record *ring, uint16_t size);
-/* Power is on. after_reset: a watchdog or brown-out ended the time before: the first byte is then a ^C. Call
- * dr_guard_link() next; the proof of identity begins 1 s after the device is present. */
-void dr_guard_start(dr_guard *g, dr_us now, bool after_reset);
+
+/* What ended the time before. */
+typedef enum {
+    DR_START_POWER_ON,    /* nothing that is known of: nothing was under way */
+    DR_START_AFTER_RESET, /* a watchdog, a brown-out, a kill: something may move. The first byte is a ^C */
+    DR_START_MID_FRAME /* the same, while a frame left (dr_guard_is_mid_frame): the controller may hold half of it, and
+                          * any byte might complete it. DR_FAULT_TORN: nothing is sent until CONFIRM */
+} dr_start;
+/* Power is on. Call dr_guard_link() next; the proof of identity begins 1 s after the device is present. */
+void dr_guard_start(dr_guard *g, dr_us now, dr_start how);
 
 void dr_guard_push_host(dr_guard *g, dr_us now, const uint8_t *bytes, size_t count);
 void dr_guard_push_device(dr_guard *g, dr_us now, const uint8_t *bytes, size_t count);
 /* Bytes that leave now; how many, 0 when there are none yet. */
 size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room);
 size_t dr_guard_pull_host(dr_guard *g, dr_us now, uint8_t *bytes, size_t room);
+/* A frame of more than one byte has been begun and not yet pulled to its end. Who may be reset at any moment asks after
+ * each byte, before it goes to the line, and keeps the answer where a reset does not reach, until this says no and the
+ * line has sent its last byte: for dr_guard_start(). */
+bool dr_guard_is_mid_frame(const dr_guard *g);
 /* When something will happen by itself (a byte that must wait before it can be pulled counts). False: never, as things
  * are. At that instant call any function with that `now`, dr_guard_pull_device() for one. */
 bool dr_guard_due(const dr_guard *g, dr_us *when);

@@ -81,9 +81,11 @@ static bool is_at_an_end(const dr_guard *g, const dr_reply *reply)
     const dr_segment stays = {{g->path.line.from_q[DR_X], g->path.line.from_q[DR_Y], g->path.line.from_q[DR_Z]},
                               {g->path.line.from_q[DR_X], g->path.line.from_q[DR_Y], g->path.line.from_q[DR_Z]}};
     const dr_box start = dr_box_around(&stays);
-    const bool homes = g->command.op == DR_OP_TRIO_HOME || g->command.op == DR_OP_TRIO_HOME_TO;
+    const bool homes =
+        g->command.op == DR_OP_TRIO_HOME || g->command.op == DR_OP_TRIO_HOME_TO || g->command.op == DR_OP_MPC_HOME;
     return dr_g_is_at(g, reply, &g->path.target_q) ||
-           (homes && has_rig(g, DR_RIG_Y_LOCKED_OUT) && dr_g_is_at(g, reply, &without_y)) ||
+           (homes && has_rig(g, (uint16_t)(DR_RIG_Y_LOCKED_OUT << g->path_drive)) &&
+            dr_g_is_at(g, reply, &without_y)) ||
            (g->small && dr_g_is_at(g, reply, &start));
 }
 
@@ -99,7 +101,12 @@ void dr_g_read_for_end(dr_guard *g, dr_us now, const dr_reply *reply)
             g->scene.frame_lost = false;
         if (g->end_told)
             dr_g_put_host(g, DR_CR);
-        dr_g_log_event(g, now, DR_EVENT_ENDED, g->command.op, DR_NO_ITEM);
+        dr_record record = dr_g_record_of(g, now, DR_EVENT_ENDED, g->command.op);
+        record.item = g->path_drive;
+        record.count = g->end_told;
+        record.bytes[0] = DR_CR;
+        copy_point(record.position_steps, reply->steps);
+        dr_log_put(&g->log, &record);
         return;
     }
     if (!dr_g_has_two(g, now, reply, &agree))

@@ -2,19 +2,22 @@
 
 #include <string.h>
 
-/* -- CRC-32C: a nibble at a time, 16 words of table ------------------------------------------------------------------- */
+/* -- CRC-32C: a byte at a time, from what its two nibbles do: 32 words of table, and no shift but by whole bytes --------- */
 
 uint32_t dr_crc32c(uint32_t crc, const uint8_t *bytes, size_t count)
 {
-    static const uint32_t of_nibble[16] = {
+    static const uint32_t of_low[16] = {
+        0x00000000u, 0xF26B8303u, 0xE13B70F7u, 0x1350F3F4u, 0xC79A971Fu, 0x35F1141Cu, 0x26A1E7E8u, 0xD4CA64EBu,
+        0x8AD958CFu, 0x78B2DBCCu, 0x6BE22838u, 0x9989AB3Bu, 0x4D43CFD0u, 0xBF284CD3u, 0xAC78BF27u, 0x5E133C24u,
+    };
+    static const uint32_t of_high[16] = {
         0x00000000u, 0x105EC76Fu, 0x20BD8EDEu, 0x30E349B1u, 0x417B1DBCu, 0x5125DAD3u, 0x61C69362u, 0x7198540Du,
         0x82F63B78u, 0x92A8FC17u, 0xA24BB5A6u, 0xB21572C9u, 0xC38D26C4u, 0xD3D3E1ABu, 0xE330A81Au, 0xF36E6F75u,
     };
     crc = ~crc;
     for (size_t i = 0; i < count; i++) {
-        crc ^= bytes[i];
-        crc = crc >> 4 ^ of_nibble[crc & 15u];
-        crc = crc >> 4 ^ of_nibble[crc & 15u];
+        const uint8_t byte = (uint8_t)(crc ^ bytes[i]);
+        crc = crc >> 8 ^ of_low[byte & 15u] ^ of_high[byte >> 4];
     }
     return ~crc;
 }
@@ -109,12 +112,12 @@ typedef struct {
     uint32_t crc;
 } sink;
 
-static void put_byte(sink *to, uint8_t byte)
+static void put_bytes(sink *to, const uint8_t *bytes, size_t count)
 {
     if (to->image != NULL)
-        to->image[to->at] = byte;
-    to->at++;
-    to->crc = dr_crc32c(to->crc, &byte, 1);
+        memcpy(to->image + to->at, bytes, count);
+    to->at += count;
+    to->crc = dr_crc32c(to->crc, bytes, count);
 }
 
 static void put_struct(sink *to, const field *fields, size_t count, const void *from)
@@ -122,9 +125,11 @@ static void put_struct(sink *to, const field *fields, size_t count, const void *
     for (size_t i = 0; i < count; i++)
         for (uint8_t n = 0; n < fields[i].count; n++) {
             const uint8_t *at = (const uint8_t *)from + fields[i].offset + (size_t)n * fields[i].size;
-            const uint64_t value = load(at, fields[i].size);
-            for (uint8_t byte = 0; byte < fields[i].size; byte++)
-                put_byte(to, (uint8_t)(value >> (8u * byte)));
+            uint64_t value = load(at, fields[i].size);
+            uint8_t bytes[sizeof value];
+            for (uint8_t byte = 0; byte < fields[i].size; byte++, value >>= 8)
+                bytes[byte] = (uint8_t)value;
+            put_bytes(to, bytes, fields[i].size);
         }
 }
 
@@ -143,8 +148,7 @@ static const uint8_t *get_struct(const uint8_t *image, const field *fields, size
 static uint32_t put_all(const dr_limits *limits, sink to)
 {
     static const dr_obstacle none = {0, 0, 0, {{0, 0, 0}, {0, 0, 0}}, {0, {0, 0, 0}}};
-    for (size_t i = 0; i < sizeof image_head; i++)
-        put_byte(&to, image_head[i]);
+    put_bytes(&to, image_head, sizeof image_head);
     put_struct(&to, head_fields, FIELDS(head_fields), limits);
     for (uint8_t i = 0; i < DR_PORTS; i++)
         put_struct(&to, drive_fields, FIELDS(drive_fields), &limits->drives[i]);
@@ -242,7 +246,8 @@ bool dr_limits_init_drive(dr_limits *limits, uint8_t drive, dr_stage_id id)
 /* -- Does it make sense? ------------------------------------------------------------------------------------------------ */
 
 #define FOR_TRIO_ONLY (DR_RIG_Y_LOCKED_OUT | DR_RIG_CALIBRATES_AT_POWER_ON)
-#define FOR_MPC_ONLY (DR_RIG_HOME_IS_ZERO | DR_RIG_MAY_STREAM)
+#define Y_LOCKED_OUT_OF_ANY (DR_RIG_Y_LOCKED_OUT * ((1u << DR_PORTS) - 1u))
+#define FOR_MPC_ONLY (DR_RIG_HOME_IS_ZERO | DR_RIG_MAY_STREAM | Y_LOCKED_OUT_OF_ANY)
 #define FOR_BOTH (DR_RIG_KNOBS_LOCKED | DR_RIG_PATHS_UNKNOWN | DR_RIG_MAY_CALIBRATE | DR_RIG_HAS_CUT)
 #define MODE_LAST 9u /* [M table 9, 'L'] */
 

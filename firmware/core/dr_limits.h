@@ -57,14 +57,16 @@ typedef enum { DR_REFUSE_SILENT, DR_REFUSE_E } dr_refusal; /* what the host gets
 typedef enum { DR_HOST_LOSS_STOP, DR_HOST_LOSS_FINISH } dr_host_loss;
 
 enum {
-    DR_RIG_Y_LOCKED_OUT = 1u << 0,           /* TRIO external switch 5 OFF: Y may not take part in homing */
     DR_RIG_CALIBRATES_AT_POWER_ON = 1u << 1, /* TRIO external switch 6 ON: power moves every axis */
     DR_RIG_KNOBS_LOCKED = 1u << 2,           /* nobody turns a knob while programs move */
     DR_RIG_PATHS_UNKNOWN = 1u << 3,          /* believe no documented path: 'S' too may be anywhere in the hull */
     DR_RIG_HOME_IS_ZERO = 1u << 4,           /* MPC: 'H' goes to 0,0,0 and nowhere else */
     DR_RIG_MAY_CALIBRATE = 1u << 5,          /* 'R' and 'N', while a person allows it */
     DR_RIG_MAY_STREAM = 1u << 6,             /* 'O' */
-    DR_RIG_HAS_CUT = 1u << 7                 /* a relay in the controller's supply */
+    DR_RIG_HAS_CUT = 1u << 7,                /* a relay in the controller's supply */
+    /* Y may stay out of homing: external switch 5 of a TRIO [T table 1] is OFF, or switch 8 of an MPC-200's first drive
+     * [M table 3]; << drive for its other drives. */
+    DR_RIG_Y_LOCKED_OUT = 1u << 8
 };
 
 typedef struct {

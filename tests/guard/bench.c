@@ -322,7 +322,7 @@ void bench_start(void)
     TEST_ASSERT_TRUE(dr_limits_check(&rig.limits, &problem));
     dr_controller_start(&rig.controller, clock_now());
     dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64);
-    dr_guard_start(&rig.guard, clock_now(), false);
+    dr_guard_start(&rig.guard, clock_now(), DR_START_POWER_ON);
     rig.state = status().state;
     drain_log();
     dr_guard_link(&rig.guard, clock_now(), true, true);

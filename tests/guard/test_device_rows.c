@@ -368,6 +368,32 @@ static void row_47_y_that_is_locked_out_of_homing_is_no_wrong_end(void)
     }
 }
 
+static void row_47_y_that_switch_8_leaves_out_is_no_wrong_end(void)
+{
+    for (unsigned locked_out = 0; locked_out < 3; locked_out++) { /* of no drive, of this one, of another */
+        bench_mpc();
+        rig.limits.rig |= DR_RIG_HOME_IS_ZERO;
+        rig.limits.rig |= (uint16_t)(locked_out == 0 ? 0 : DR_RIG_Y_LOCKED_OUT << (locked_out - 1u));
+        rig.limits.drives[0].max_move_q = (uint32_t)DR_FAR_Q;
+        for (unsigned axis = 0; axis < DR_AXES; axis++)
+            rig.limits.drives[0].box_q.min_q[axis] = 0;
+        rig.drives[0].y_moves_home = false;
+        bench_start();
+        bench_arm();
+        host_code('H');
+        run_ms(6000);
+        expect_tip(0, 0, 80000, 0);
+        if (locked_out == 1) {
+            expect_fault(DR_FAULT_NONE);
+            expect_cr();
+            expect_state(DR_GUARD_IDLE);
+        } else {
+            expect_fault(DR_FAULT_WRONG_END);
+            expect_silence();
+        }
+    }
+}
+
 static void row_48_ctrl_c_that_is_ignored(void)
 {
     fake_rig();
@@ -927,10 +953,79 @@ static void a_cable_pulled_within_a_frame_leaves_nothing_that_completes_it(void)
     }
 }
 
+/* What a board does: it asks after each byte, keeps the answer over the reset, and starts again. */
+static void row_74_a_reset_within_a_frame_leaves_nothing_that_completes_it(void)
+{
+    for (uint32_t cut = 0; cut <= 14; cut++) {
+        bench_mpc();
+        bench_start();
+        bench_arm();
+        const uint32_t before = rig.wire_count + 1; /* the guard's own query goes first */
+        host_line(15, 80800, 80000, 80000);
+        while (rig.wire_count < before + cut)
+            run_us(10);
+        const bool torn = dr_guard_is_mid_frame(&rig.guard);
+        TEST_ASSERT_EQUAL(cut > 0 && cut < 14, torn);
+        rig.framer.have = rig.framer.want = 0;
+        rig.crc = rig.next_sequence = rig.frames_refused = 0;
+        rig.state = DR_GUARD_LOCKED;
+        dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64);
+        const dr_us now = (dr_us)(rig.clock_at_start + rig.now);
+        dr_guard_start(&rig.guard, now, torn ? DR_START_MID_FRAME : DR_START_AFTER_RESET);
+        const uint32_t sent = rig.wire_count;
+        cables(true, true);
+        TEST_ASSERT_EQUAL(torn ? DR_START_MID_FRAME : DR_START_AFTER_RESET, last_record(DR_EVENT_START)->code);
+        if (!torn) {
+            run_ms(1500);
+            expect_state(DR_GUARD_DISARMED);
+            TEST_ASSERT_EQUAL(0x03, rig.wire[sent]);
+            continue;
+        }
+        expect_state(DR_GUARD_LOCKED);
+        expect_fault(DR_FAULT_TORN);
+        TEST_ASSERT_TRUE(status().confirm_wanted);
+        host_code(0x03);
+        stop_input(true);
+        stop_input(false);
+        clear_fault();
+        press(DR_INPUT_ARM);
+        run_ms(70000);
+        TEST_ASSERT_EQUAL(sent, rig.wire_count);
+        expect_state(DR_GUARD_LOCKED);
+        expect_tip(0, 80000, 80000, 80000);
+        const dr_hand off = {DR_HAND_POWER_OFF, 0, 0, {0, 0, 0}}, on = {DR_HAND_POWER_ON, 0, 0, {0, 0, 0}};
+        const dr_us later = (dr_us)(rig.clock_at_start + rig.now);
+        TEST_ASSERT_TRUE(dr_controller_poke(&rig.controller, later, &off));
+        TEST_ASSERT_TRUE(dr_controller_poke(&rig.controller, later, &on));
+        press(DR_INPUT_CONFIRM);
+        run_ms(1100);
+        expect_state(DR_GUARD_DISARMED);
+        expect_tip(0, 80000, 80000, 80000);
+    }
+}
+
+/* Without limits too: whoever does not know that a frame was torn would let ^C pass. */
+static void a_torn_frame_is_remembered_without_limits(void)
+{
+    bench_mpc();
+    dr_guard_init(&rig.guard, NULL, rig.ring, 64);
+    dr_guard_start(&rig.guard, 0, DR_START_MID_FRAME);
+    dr_guard_link(&rig.guard, 0, true, true);
+    host_code(0x03);
+    TEST_ASSERT_EQUAL(0, rig.wire_count);
+    expect_fault(DR_FAULT_LIMITS);
+    TEST_ASSERT_TRUE(status().confirm_wanted);
+    press(DR_INPUT_CONFIRM);
+    host_code(0x03);
+    TEST_ASSERT_EQUAL(1, rig.wire_count);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(the_controller_to_order_works_when_nothing_is_ordered);
+    RUN_TEST(row_74_a_reset_within_a_frame_leaves_nothing_that_completes_it);
+    RUN_TEST(a_torn_frame_is_remembered_without_limits);
     RUN_TEST(row_39_a_lost_cr);
     RUN_TEST(row_40_a_late_cr_is_not_forwarded);
     RUN_TEST(row_41_of_many_crs_one_is_forwarded);
@@ -944,6 +1039,7 @@ int main(void)
     RUN_TEST(row_46_small_moves_may_be_ignored);
     RUN_TEST(row_47_an_end_elsewhere);
     RUN_TEST(row_47_y_that_is_locked_out_of_homing_is_no_wrong_end);
+    RUN_TEST(row_47_y_that_switch_8_leaves_out_is_no_wrong_end);
     RUN_TEST(row_48_ctrl_c_that_is_ignored);
     RUN_TEST(a_rig_that_calibrates_at_power_on_gets_its_power_back_when_a_person_confirms);
     RUN_TEST(row_49_pause_on_stop);

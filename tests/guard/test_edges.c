@@ -702,7 +702,7 @@ static void after_a_reset_ctrl_c_waits_for_the_controller(void)
 {
     bench_trio();
     dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64);
-    dr_guard_start(&rig.guard, guard_clock(), true);
+    dr_guard_start(&rig.guard, guard_clock(), DR_START_AFTER_RESET);
     dr_controller_start(&rig.controller, guard_clock());
     link_is(true, false);
     TEST_ASSERT_EQUAL(0, rig.wire_count);

@@ -118,8 +118,11 @@ static void row_71_nonsense_in_the_head(void)
     good.firmware = 0x0A21, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
     good.firmware = 0xA321, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
     good.firmware = 0x0099, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
-    good.rig = DR_RIG_Y_LOCKED_OUT, expect(DR_LIMITS_RIG, 0, DR_AXES);
-    good.rig = 0x0100, expect(DR_LIMITS_RIG, 0, DR_AXES);
+    good.rig = DR_RIG_CALIBRATES_AT_POWER_ON, expect(DR_LIMITS_RIG, 0, DR_AXES);
+    good.rig = 0x0001, expect(DR_LIMITS_RIG, 0, DR_AXES);
+    good.rig = 0x1000, expect(DR_LIMITS_RIG, 0, DR_AXES);
+    for (unsigned drive = 0; drive < DR_PORTS; drive++) /* switch 8 of each drive */
+        good.rig = (uint16_t)(DR_RIG_Y_LOCKED_OUT << drive), expect(DR_LIMITS_GOOD, 0, DR_AXES);
     good.rig = DR_RIG_MAY_STREAM | DR_RIG_HOME_IS_ZERO | DR_RIG_HAS_CUT, expect(DR_LIMITS_GOOD, 0, DR_AXES);
     good.serial[3] = 'x', expect(DR_LIMITS_SERIAL, 0, DR_AXES);
     good.serial[2] = 0x07, expect(DR_LIMITS_SERIAL, 0, DR_AXES);
@@ -247,6 +250,8 @@ static void a_trio_has_one_drive_and_switches(void)
     good.rig = DR_RIG_Y_LOCKED_OUT | DR_RIG_CALIBRATES_AT_POWER_ON;
     TEST_ASSERT_TRUE(dr_limits_check(&good, &problem));
     good.rig = DR_RIG_MAY_STREAM;
+    TEST_ASSERT_FALSE(dr_limits_check(&good, &problem));
+    good.rig = DR_RIG_Y_LOCKED_OUT << 1;
     TEST_ASSERT_FALSE(dr_limits_check(&good, &problem));
     good.rig = 0;
     TEST_ASSERT_TRUE(dr_limits_init_drive(&good, 1, DR_STAGE_TRIO_MP845));

@@ -530,7 +530,7 @@ static void without_valid_limits_only_ctrl_c_passes(void)
         bench_trio();
         rig.limits.margin_q = -1;
         dr_guard_init(&rig.guard, which == 0 ? NULL : &rig.limits, rig.ring, 64);
-        dr_guard_start(&rig.guard, guard_clock(), false);
+        dr_guard_start(&rig.guard, guard_clock(), DR_START_POWER_ON);
         dr_controller_start(&rig.controller, guard_clock());
         link_is(true, true);
         expect_state(DR_GUARD_LOCKED);
@@ -556,7 +556,7 @@ static void row_74_after_a_reset_in_mid_move_ctrl_c_goes_first(void)
     rig.crc = rig.next_sequence = 0;
     rig.frames_refused = 0;
     rig.state = DR_GUARD_LOCKED;
-    dr_guard_start(&rig.guard, guard_clock(), true);
+    dr_guard_start(&rig.guard, guard_clock(), DR_START_AFTER_RESET);
     const uint32_t wire = rig.wire_count;
     link_is(true, true);
     run_ms(5);
@@ -663,7 +663,7 @@ static void row_78_a_full_log_overwrites_the_oldest_a_failed_one_disarms(void)
     bench_trio();
     dr_controller_start(&rig.controller, guard_clock());
     dr_guard_init(&rig.guard, &rig.limits, small, 4);
-    dr_guard_start(&rig.guard, guard_clock(), false);
+    dr_guard_start(&rig.guard, guard_clock(), DR_START_POWER_ON);
     for (int i = 0; i < 10; i++)
         dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_ESCAPE, i % 2 == 0);
     TEST_ASSERT_EQUAL(7, status().log_missed);
@@ -677,7 +677,7 @@ static void row_78_a_full_log_overwrites_the_oldest_a_failed_one_disarms(void)
     TEST_ASSERT_EQUAL(10, record.sequence);
 
     dr_guard_init(&rig.guard, &rig.limits, NULL, 100);
-    dr_guard_start(&rig.guard, guard_clock(), false);
+    dr_guard_start(&rig.guard, guard_clock(), DR_START_POWER_ON);
     TEST_ASSERT_TRUE((status().needs & DR_NEEDS_LOG) != 0);
     TEST_ASSERT_FALSE(dr_guard_pull_log(&rig.guard, &record));
 

@@ -41,7 +41,7 @@ static unsigned bytes_until(dr_us *now, dr_us end)
 static void without_an_answer_fewer_bytes_leave_than_end_a_torn_frame(void)
 {
     dr_us now = 0;
-    dr_guard_start(&guard, now, true);
+    dr_guard_start(&guard, now, DR_START_AFTER_RESET);
     dr_guard_link(&guard, now, false, true);
     const unsigned sent = bytes_until(&now, 600 * S_US);
     TEST_ASSERT_GREATER_THAN_UINT(2, sent); /* ^C, and more than one query: a TRIO may be calibrating */
@@ -58,7 +58,7 @@ static void a_controller_that_listens_after_fifty_seconds_is_found(void)
     static const uint8_t here[] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, DR_CR};
     dr_us now = 0, when;
     dr_guard_status status;
-    dr_guard_start(&guard, now, true);
+    dr_guard_start(&guard, now, DR_START_AFTER_RESET);
     dr_guard_link(&guard, now, false, true);
     (void)bytes_until(&now, 50 * S_US);
     for (unsigned i = 0; i < 8 && dr_guard_due(&guard, &when); i++) {
