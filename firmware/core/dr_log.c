@@ -4,8 +4,8 @@
 
 static uint8_t *put_uint(uint8_t *bytes, uint32_t value)
 {
-    for (uint8_t i = 0; i < 4; i++)
-        *bytes++ = (uint8_t)(value >> (8u * i));
+    for (uint8_t i = 0; i < 4; i++, value >>= 8)
+        *bytes++ = (uint8_t)value;
     return bytes;
 }
 
@@ -36,6 +36,12 @@ void dr_log_init(dr_log *log, dr_record *ring, uint16_t size)
     *log = (dr_log){ring, ring == NULL ? (uint16_t)0 : size, 0, 0, 0, 0, 0};
 }
 
+static void drop_oldest(dr_log *log)
+{
+    log->first = (uint16_t)(log->first + 1u < log->size ? log->first + 1u : 0u);
+    log->count--;
+}
+
 void dr_log_put(dr_log *log, dr_record *record)
 {
     record->sequence = log->sequence++;
@@ -45,11 +51,11 @@ void dr_log_put(dr_log *log, dr_record *record)
         return;
     }
     if (log->count == log->size) {
-        log->first = (uint16_t)((log->first + 1u) % log->size);
-        log->count--;
+        drop_oldest(log);
         log->missed++;
     }
-    log->ring[((uint32_t)log->first + log->count) % log->size] = *record;
+    const uint32_t at = (uint32_t)log->first + log->count;
+    log->ring[at < log->size ? at : at - log->size] = *record;
     log->count++;
 }
 
@@ -58,7 +64,6 @@ bool dr_log_take(dr_log *log, dr_record *out)
     if (log->count == 0)
         return false;
     *out = log->ring[log->first];
-    log->first = (uint16_t)((log->first + 1u) % log->size);
-    log->count--;
+    drop_oldest(log);
     return true;
 }
