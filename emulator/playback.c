@@ -4,8 +4,8 @@
 #include "link.h" /* the port's stable name */
 #include "pty.h"  /* the port */
 
-#include "dr_record.h" /* the recording */
-#include "dr_words.h"  /* what bytes mean */
+#include "dr_recording.h" /* the recording */
+#include "dr_words.h"     /* what bytes mean */
 
 #include <errno.h>
 #include <poll.h>
@@ -32,12 +32,12 @@ typedef struct {
     bool is_request;
     uint8_t op; /* of a request: dr_op; DR_OP_NONE: a byte that is no command */
     uint8_t count;
-    uint8_t bytes[DR_RECORD_BYTES];
+    uint8_t bytes[DR_RECORDING_BYTES];
 } item;
 
 typedef struct {
     const playback_options *o;
-    char name[DR_RECORD_NAME]; /* "": none yet */
+    char name[DR_RECORDING_NAME]; /* "": none yet */
     dr_words_context context;
     uint16_t newest; /* firmware, where the recording does not say; 0: which controller is not known yet */
     bool has_stage;
@@ -90,7 +90,7 @@ static bool push(const player *p, dr_framer *framer, uint8_t byte, item *out)
     return true;
 }
 
-static const char *take_setting(player *p, const dr_record *r)
+static const char *take_setting(player *p, const dr_recorded *r)
 {
     dr_stage_id stage = DR_STAGE_NONE;
     if (strcmp(r->key, "controller") == 0) {
@@ -109,18 +109,18 @@ static const char *take_setting(player *p, const dr_record *r)
     return NULL;
 }
 
-static const char *take(player *p, const dr_record *r, unsigned line, dr_framer *framer)
+static const char *take(player *p, const dr_recorded *r, unsigned line, dr_framer *framer)
 {
     static const char no_memory[] = "no memory";
     if (p->name[0] == '\0')
         (void)snprintf(p->name, sizeof p->name, "%s", r->name);
     if (strcmp(p->name, r->name) != 0)
         return "a second controller: one can be played to a host; keep the lines of that one alone";
-    if (r->kind == DR_RECORD_SETTING)
+    if (r->kind == DR_RECORDING_SETTING)
         return take_setting(p, r);
     if (p->newest == 0)
         return "which controller? 'set NAME controller trio' or mpc is missing before this line";
-    if (r->kind == DR_RECORD_TO_HOST) {
+    if (r->kind == DR_RECORDING_TO_HOST) {
         item *const reply = add_item(p);
         if (reply == NULL)
             return no_memory;
@@ -129,7 +129,7 @@ static const char *take(player *p, const dr_record *r, unsigned line, dr_framer 
         reply->when_us = r->when_us;
         reply->line = line;
     }
-    for (size_t i = 0; r->kind == DR_RECORD_FROM_HOST && i < r->count; i++) {
+    for (size_t i = 0; r->kind == DR_RECORDING_FROM_HOST && i < r->count; i++) {
         item request;
         if (!push(p, framer, r->bytes[i], &request))
             continue;
@@ -145,8 +145,8 @@ static const char *take(player *p, const dr_record *r, unsigned line, dr_framer 
 
 static bool read_recording(player *p)
 {
-    dr_record_reader reader;
-    dr_record r;
+    dr_recording_reader reader;
+    dr_recorded r;
     dr_framer framer;
     const char *why = NULL;
     FILE *const file = fopen(p->o->path, "re");
@@ -155,8 +155,8 @@ static bool read_recording(player *p)
         return false;
     }
     dr_framer_reset(&framer);
-    bool is_right = dr_record_open(&reader, file);
-    while (is_right && why == NULL && dr_record_next(&reader, &r))
+    bool is_right = dr_recording_open(&reader, file);
+    while (is_right && why == NULL && dr_recording_next(&reader, &r))
         why = take(p, &r, reader.line, &framer);
     if (why == NULL && reader.why[0] != '\0')
         why = reader.why;

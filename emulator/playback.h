@@ -1,4 +1,4 @@
-/* playback: the controller's side of a recording (dr_record.h), for a host program at a pseudo-terminal.
+/* playback: the controller's side of a recording (dr_recording.h), for a host program at a pseudo-terminal.
  *
  * The host leads: when it has made the recorded request, the recorded answer follows, as much later as it did then. The
  * clock stands before somebody has opened the port, and while a request is still to come.

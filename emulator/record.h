@@ -1,23 +1,18 @@
-/* record: an observer that writes what went over the line into a recording (dr_record.h).
+/* record: an observer that writes what went over the line into a recording (dr_recording.h).
  *
  * A pipe that nobody reads does not hold the controller up: what it has no room for is lost, and the recording says how much.
  * Thread-safety: one thread at a time per recorder. */
 #ifndef RECORD_H
 #define RECORD_H
 
-#include "observe.h" /* whose observations it keeps */
-
-#include <stdio.h>
+#include "observe.h"   /* whose observations it keeps */
+#include "recording.h" /* where they go */
 
 typedef struct {
     observer base;
-    FILE *file;
-    const char *path; /* for messages */
+    recording to;
     uint64_t epoch_ns;
     bool has_begun;
-    bool is_file;  /* which always has room */
-    uint32_t lost; /* lines that nobody took, since one was */
-    bool told_loss;
 } recorder;
 
 /* A pipe may wait for its reader. False: errno says why. */

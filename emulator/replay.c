@@ -3,8 +3,8 @@
 
 #include "setup.h" /* controllers as they are described */
 
-#include "dr_record.h" /* the recording */
-#include "dr_words.h"  /* what bytes mean */
+#include "dr_recording.h" /* the recording */
+#include "dr_words.h"     /* what bytes mean */
 
 #include <errno.h>
 #include <stdio.h>
@@ -27,11 +27,12 @@ typedef struct {
 
 /* One controller of the recording, and what it does here. */
 typedef struct {
-    char name[DR_RECORD_NAME];
+    char name[DR_RECORDING_NAME];
     char *settings[SETTINGS_MAX]; /* where the texts of `text` are */
     unsigned setting_count;
     setup_text text;
     bool is_on;
+    uint8_t places; /* bit per drive: where it is at the beginning is known, or does not matter any more */
     instrument ins;
     dr_drive drives[DR_PORTS];
     uint64_t shift_us; /* how much later things happen here */
@@ -80,7 +81,7 @@ static bool repeat(const char **places, unsigned *count, const char *text)
 }
 
 /* False: no such setting, or too many. */
-static bool take_setting(actor *a, const dr_record *r)
+static bool take_setting(actor *a, const dr_recorded *r)
 {
     const struct {
         const char *key;
@@ -117,8 +118,57 @@ static bool switch_on(actor *a, char *why, size_t room)
     }
     setup_apply(&s, &a->ins, a->drives);
     instrument_start(&a->ins, 0);
+    a->places = a->text.position_count > 0 ? UINT8_MAX : 0;
     a->is_on = true;
     return true;
+}
+
+/* -- What a recording of a real controller does not say at its beginning, but soon ---------------------------------------- */
+
+/* Which model hangs on a port that is not described does not matter unless it is moved. */
+static void learn_drives(actor *a)
+{
+    dr_reply reply;
+    const dr_controller *const c = &a->ins.controller;
+    uint8_t stage = DR_STAGE_NONE;
+    if (a->text.device_count == 0 || a->command.op != DR_OP_MPC_DRIVES ||
+        !dr_wire_get_reply(&a->command, a->recorded.bytes, a->recorded.count, &reply))
+        return;
+    for (uint8_t i = 0; i < c->drive_count && stage == DR_STAGE_NONE; i++)
+        stage = a->drives[i].stage;
+    for (uint8_t i = (uint8_t)a->text.device_count; i < c->drive_count; i++)
+        if (a->drives[i].stage == DR_STAGE_NONE && ((unsigned)reply.connected >> i & 1u) != 0)
+            dr_drive_init(&a->drives[i], (dr_stage_id)stage);
+}
+
+static uint8_t place_of(uint8_t drive) { return (uint8_t)(1u << drive); }
+
+static bool is_position(uint8_t op) { return op == DR_OP_TRIO_POSITION || op == DR_OP_MPC_POSITION; }
+
+/* The first position that a drive tells is where it has been since then, unless it was moved before. It is looked at when it
+ * has come whole in the recording, which is before the answer leaves here. */
+static void learn_place(actor *a)
+{
+    dr_reply reply;
+    dr_controller *const c = &a->ins.controller;
+    if (!is_position(a->command.op) || c->state != DR_STATE_REST ||
+        !dr_wire_get_reply(&a->command, a->recorded.bytes, a->recorded.count, &reply))
+        return;
+    const uint8_t drive = c->kind == DR_MPC ? (uint8_t)(reply.value - 1u) : 0;
+    if (drive >= c->drive_count || a->drives[drive].stage == DR_STAGE_NONE || (a->places & place_of(drive)) != 0)
+        return;
+    memcpy(a->drives[drive].position_steps, reply.steps, sizeof reply.steps);
+    if (c->kind == DR_TRIO)
+        c->angle_deg = reply.value;
+    else if (a->places == 0)
+        c->active = drive;
+    a->places = (uint8_t)(a->places | place_of(drive));
+}
+
+static void forget_place(actor *a)
+{
+    if ((a->command.is & DR_IS_MOTION) != 0)
+        a->places = (uint8_t)(a->places | place_of(a->ins.controller.active));
 }
 
 /* -- Playing ------------------------------------------------------------------------------------------------------------- */
@@ -222,7 +272,7 @@ static void compare(actor *a, bool is_last)
     was->count = 0;
 }
 
-static void host_writes(actor *a, const dr_record *r)
+static void host_writes(actor *a, const dr_recorded *r)
 {
     settle(a, r->when_us);
     compare(a, false);
@@ -231,8 +281,10 @@ static void host_writes(actor *a, const dr_record *r)
     a->real_us = r->real_us;
     for (size_t i = 0; i < r->count; i++)
         if (dr_framer_push(&a->framer, (dr_kind)a->ins.controller.kind, a->ins.controller.firmware, r->bytes[i],
-                           &a->command) == DR_FRAMED_WHOLE)
+                           &a->command) == DR_FRAMED_WHOLE) {
             memcpy(a->frame, a->framer.bytes, sizeof a->frame);
+            forget_place(a);
+        }
     while (at < r->count) { /* the line takes 64 bytes within a few ms */
         uint64_t due_us;
         at += instrument_take(&a->ins, at == 0 && pause_us < UINT32_MAX ? (uint32_t)pause_us : 0, r->bytes + at,
@@ -244,29 +296,31 @@ static void host_writes(actor *a, const dr_record *r)
 }
 
 /* False: why[] says what is wrong with this line. */
-static bool take(play *p, const dr_record *r, char *why, size_t room)
+static bool take(play *p, const dr_recorded *r, char *why, size_t room)
 {
     actor *const a = actor_of(p, r->name);
     if (a == NULL) {
         (void)snprintf(why, room, "no memory");
         return false;
     }
-    if (r->kind == DR_RECORD_SETTING) {
+    if (r->kind == DR_RECORDING_SETTING) {
         (void)snprintf(why, room, "no such setting, or too many of them, or it comes too late");
         return !a->is_on && take_setting(a, r);
     }
     if (!a->is_on && !switch_on(a, why, room))
         return false;
-    switch ((dr_record_kind)r->kind) {
-    case DR_RECORD_FROM_HOST:
+    switch ((dr_recorded_kind)r->kind) {
+    case DR_RECORDING_FROM_HOST:
         host_writes(a, r);
         break;
-    case DR_RECORD_TO_HOST:
-    case DR_RECORD_LOST:
+    case DR_RECORDING_TO_HOST:
+    case DR_RECORDING_LOST:
         keep(&a->recorded, r->bytes, r->count, r->when_us);
+        learn_drives(a);
+        learn_place(a);
         break;
-    case DR_RECORD_EVENT:
-    case DR_RECORD_SETTING:
+    case DR_RECORDING_EVENT:
+    case DR_RECORDING_SETTING:
         a->events++;
         break;
     }
@@ -309,16 +363,16 @@ static void forget(play *p)
 int replay(const char *path)
 {
     play p = {path, NULL, 0};
-    dr_record_reader reader;
-    dr_record r;
+    dr_recording_reader reader;
+    dr_recorded r;
     char why[1024] = "";
     FILE *const file = fopen(path, "re");
     if (file == NULL) {
         (void)fprintf(stderr, "dryrig-emu: replay: %s: %s\n", path, strerror(errno));
         return EXIT_WRONG;
     }
-    bool is_right = dr_record_open(&reader, file), is_same = true;
-    while (is_right && dr_record_next(&reader, &r))
+    bool is_right = dr_recording_open(&reader, file), is_same = true;
+    while (is_right && dr_recording_next(&reader, &r))
         is_right = take(&p, &r, why, sizeof why);
     for (unsigned i = 0; i < p.count; i++)
         is_same = sum_up(p.actors[i]) && is_same;

@@ -1,4 +1,4 @@
-/* replay: a recording (dr_record.h) against the controllers that it describes.
+/* replay: a recording (dr_recording.h) against the controllers that it describes.
  *
  * The host's side is played and the controllers' answers are compared, in their own time: nothing waits, no port is opened.
  * What was recorded at a real controller may have taken more or less time than here; so a command is played when the

@@ -1,8 +1,8 @@
 #include "decode.h"
 
-#include "dr_record.h" /* recordings */
-#include "dr_wire.h"   /* frames */
-#include "dr_words.h"  /* what bytes mean */
+#include "dr_recording.h" /* recordings */
+#include "dr_wire.h"      /* frames */
+#include "dr_words.h"     /* what bytes mean */
 
 #include <errno.h>
 #include <stdio.h>
@@ -15,7 +15,7 @@
 
 /* One controller and its host, as far as their bytes tell. */
 typedef struct {
-    char name[DR_RECORD_NAME];
+    char name[DR_RECORDING_NAME];
     dr_words_context context;
     dr_stage_id stages[DR_PORTS]; /* of the ports, in order */
     unsigned stage_count, drive;  /* drive: index of the one that seems to be active */
@@ -249,7 +249,7 @@ static talk *talk_of(decoder *d, const char *name)
 }
 
 /* What does not matter here is left to others. False: it is not understood. */
-static bool take_setting(talk *t, const dr_record *r)
+static bool take_setting(talk *t, const dr_recorded *r)
 {
     if (strcmp(r->key, "controller") == 0) {
         t->knows_controller = dr_words_kind_find(r->text, &t->context.kind);
@@ -266,9 +266,9 @@ static bool take_setting(talk *t, const dr_record *r)
     return true;
 }
 
-static bool take_record(decoder *d, talk *t, const dr_record *r, const char **why)
+static bool take_record(decoder *d, talk *t, const dr_recorded *r, const char **why)
 {
-    if (r->kind == DR_RECORD_SETTING) {
+    if (r->kind == DR_RECORDING_SETTING) {
         *why = "this setting is not understood";
         return take_setting(t, r);
     }
@@ -277,29 +277,29 @@ static bool take_record(decoder *d, talk *t, const dr_record *r, const char **wh
     *why = "which controller? 'set NAME controller trio' or mpc is missing before it";
     if (!t->knows_controller)
         return false;
-    switch ((dr_record_kind)r->kind) {
-    case DR_RECORD_FROM_HOST:
+    switch ((dr_recorded_kind)r->kind) {
+    case DR_RECORDING_FROM_HOST:
         for (size_t i = 0; i < r->count; i++)
             take_from_host(d, t, r->bytes[i]);
         break;
-    case DR_RECORD_TO_HOST:
+    case DR_RECORDING_TO_HOST:
         for (size_t i = 0; i < r->count; i++)
             take_from_controller(d, t, r->bytes[i]);
         break;
-    case DR_RECORD_LOST:
+    case DR_RECORDING_LOST:
         tell_frame(d, t, '!', "bytes for the host that it never got");
         for (size_t i = 0; i < r->count; i++)
             tell_byte((unsigned)i, r->bytes[i], "");
         break;
-    case DR_RECORD_EVENT:
-    case DR_RECORD_SETTING:
+    case DR_RECORDING_EVENT:
+    case DR_RECORDING_SETTING:
         tell_frame(d, t, '-', r->text);
         break;
     }
     return true;
 }
 
-static int refuse_file(const char *path, const dr_record_reader *reader, const char *why)
+static int refuse_file(const char *path, const dr_recording_reader *reader, const char *why)
 {
     (void)fflush(stdout);
     (void)fprintf(stderr, "dryrig: %s:%u: %s\n", path, reader->line, why);
@@ -309,12 +309,12 @@ static int refuse_file(const char *path, const dr_record_reader *reader, const c
 static int decode_recording(const char *path, FILE *file)
 {
     decoder d = {NULL, 0, true, ""};
-    dr_record_reader reader;
-    dr_record r;
+    dr_recording_reader reader;
+    dr_recorded r;
     int status = EXIT_DONE;
-    if (!dr_record_open(&reader, file))
+    if (!dr_recording_open(&reader, file))
         return refuse_file(path, &reader, reader.why);
-    while (status == EXIT_DONE && dr_record_next(&reader, &r)) {
+    while (status == EXIT_DONE && dr_recording_next(&reader, &r)) {
         const char *why = "no memory";
         talk *const t = talk_of(&d, r.name);
         if (t == NULL || !take_record(&d, t, &r, &why))

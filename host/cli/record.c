@@ -1,7 +1,7 @@
 #include "record.h"
 
-#include "dr_record.h" /* the format */
-#include "dr_words.h"  /* firmware as text */
+#include "dr_recording.h" /* the format */
+#include "dr_words.h"     /* firmware as text */
 
 #include <errno.h>
 #include <string.h>
@@ -16,12 +16,12 @@ static void check(record *r, bool done)
     r->file = NULL;
 }
 
-static void keep(record *r, dr_record_kind kind, const void *bytes, size_t count)
+static void keep(record *r, dr_recorded_kind kind, const void *bytes, size_t count)
 {
     if (r->file == NULL)
         return;
     const uint64_t when_us = r->inner.now_us(r->inner.context) - r->epoch_us;
-    check(r, dr_record_bytes(r->file, when_us, when_us, r->name, kind, bytes, count));
+    check(r, dr_recording_bytes(r->file, when_us, when_us, r->name, kind, bytes, count));
 }
 
 static int read_kept(void *context, void *bytes, size_t room, uint32_t timeout_us)
@@ -29,14 +29,14 @@ static int read_kept(void *context, void *bytes, size_t room, uint32_t timeout_u
     record *const r = context;
     const int count = r->inner.read(r->inner.context, bytes, room, timeout_us);
     if (count > 0)
-        keep(r, DR_RECORD_TO_HOST, bytes, (size_t)count);
+        keep(r, DR_RECORDING_TO_HOST, bytes, (size_t)count);
     return count;
 }
 
 static int write_kept(void *context, const void *bytes, size_t count)
 {
     record *const r = context;
-    keep(r, DR_RECORD_FROM_HOST, bytes, count); /* before the answer, also where writing takes its time */
+    keep(r, DR_RECORDING_FROM_HOST, bytes, count); /* before the answer, also where writing takes its time */
     return r->inner.write(r->inner.context, bytes, count);
 }
 
@@ -71,13 +71,13 @@ static void close_all(void *context)
 static bool introduce(const record *r, const command_line *line)
 {
     char firmware[16];
-    bool done = dr_record_begin(r->file) && dr_record_set(r->file, r->name, "controller", r->name);
+    bool done = dr_recording_begin(r->file) && dr_recording_set(r->file, r->name, "controller", r->name);
     if (line->open.firmware != 0) {
         (void)dr_words_firmware(firmware, sizeof firmware, (uint16_t)line->open.firmware);
-        done = dr_record_set(r->file, r->name, "firmware", firmware) && done;
+        done = dr_recording_set(r->file, r->name, "firmware", firmware) && done;
     }
     for (int i = 0; i < DRYRIG_DRIVES && line->open.stage[i] != NULL; i++)
-        done = dr_record_set(r->file, r->name, "device", line->open.stage[i]) && done;
+        done = dr_recording_set(r->file, r->name, "device", line->open.stage[i]) && done;
     return done;
 }
 

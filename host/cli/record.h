@@ -1,4 +1,4 @@
-/* record: keeps what goes over the line in a recording (dr_record.h), at the controller's side of the library.
+/* record: keeps what goes over the line in a recording (dr_recording.h), at the controller's side of the library.
  *
  * Thread-safety: as the link that it wraps. */
 #ifndef RECORD_H

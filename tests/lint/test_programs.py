@@ -1,6 +1,7 @@
 """run, lint, --record and replay through the port: programs that are right, and the example of docs/ci.md, which is not."""
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -147,6 +148,23 @@ class Recordings(unittest.TestCase):
                      "set mpc quirks position-13,nul-heartbeat", "set mpc pace on"):
             self.assertIn(line, lines)
         self.assertEqual(0, emulator("replay", self.path)[0])
+
+    def test_where_a_controller_stood_is_learned_from_what_it_first_told(self):
+        """A recording of a real controller does not begin with it."""
+        for kind in RIGHT:
+            with self.subTest(kind):
+                status, _, err = emulator("run", kind, "--record", self.path, "--speedup", "20", "--position", "1600,32,48", "--angle",
+                                          {"mpc": "14more", "trio": "60"}[kind], "--",
+                                          *script(kind, ["position", "move 100 200 50", "line 200 300 400 --speed 15"]))
+                self.assertEqual(0, status, err)
+                with open(self.path, encoding="ascii") as file:
+                    text = file.read()
+                known = re.sub(rf"set {kind} (position|angle) .*\n", "", text)
+                self.assertNotEqual(text, known)
+                with open(self.path, "w", encoding="ascii") as file:
+                    file.write(known)
+                status, out, err = emulator("replay", self.path)
+                self.assertEqual((0, ""), (status, err), out)
 
     def test_a_difference_names_both_sides_and_goes_on(self):
         self.record("trio", "--clock", "jump")

@@ -2,6 +2,7 @@
 #include "bridge.h"
 
 #include "link.h" /* the stable name of the host's port */
+#include "say.h"
 
 #include "dr_words.h"
 
@@ -53,13 +54,13 @@ static void advance(bridge *b)
 static void keep_records(bridge *b)
 {
     dr_record record;
-    bool is_kept = true;
+    bool is_kept = !b->journal.has_failed; /* until a record says otherwise */
     while (dr_guard_pull_log(&b->guard, &record)) {
         const uint64_t ago_us = (uint32_t)(bridge_now(b) - record.when);
-        is_kept = journal_add(&b->journal, &b->rig, &record, clock_us(CLOCK_REALTIME) - ago_us) && is_kept;
+        is_kept = journal_add(&b->journal, &b->rig, &record, clock_us(CLOCK_REALTIME) - ago_us);
     }
     if (!is_kept && !b->log_said)
-        (void)fprintf(stderr, "dryrig-guard: the log %s cannot be written: %s\n", b->options->log, strerror(errno));
+        say("dryrig-guard: the log %s cannot be written: %s\n", b->options->log, strerror(errno));
     if (!is_kept != b->log_said) {
         b->log_said = !is_kept;
         dr_guard_input(&b->guard, bridge_now(b), DR_INPUT_LOG_FAILED, !is_kept);
@@ -68,10 +69,49 @@ static void keep_records(bridge *b)
     }
 }
 
+/* -- The recording: what went over the controller's line --------------------------------------------------------------- */
+
+static const char *recorded_name(const bridge *b) { return dr_words_kind((dr_kind)b->rig.limits.kind); }
+
+static void record_bytes(bridge *b, char kind, const uint8_t *bytes, size_t count)
+{
+    recording_bytes(&b->recording, b->now_us, b->now_us, recorded_name(b), kind, bytes, count);
+}
+
+static void record_event(bridge *b, const char *text)
+{
+    recording_event(&b->recording, b->now_us, b->now_us, recorded_name(b), text);
+}
+
+/* What is known of the controller: what the configuration tells. */
+static bool open_recording(bridge *b)
+{
+    char text[16];
+    const dr_limits *const l = &b->rig.limits;
+    const char *const name = recorded_name(b);
+    uint8_t ports = 0;
+    if (b->options->record == NULL)
+        return true;
+    if (!recording_open(&b->recording, "dryrig-guard", b->options->record))
+        return false;
+    recording_set(&b->recording, name, "controller", name);
+    (void)dr_words_firmware(text, sizeof text, l->firmware);
+    recording_set(&b->recording, name, "firmware", text);
+    for (uint8_t drive = 0; drive < DR_PORTS; drive++)
+        if (l->drives[drive].stage != DR_STAGE_NONE)
+            ports = (uint8_t)(drive + 1u);
+    for (uint8_t drive = 0; drive < ports; drive++)
+        recording_set(&b->recording, name, "device", dr_words_stage((dr_stage_id)l->drives[drive].stage));
+    return true;
+}
+
+/* -- The controller's port --------------------------------------------------------------------------------------------- */
+
 static void lose_device(bridge *b, const char *why)
 {
     device_close(&b->device);
     (void)snprintf(b->device_says, sizeof b->device_says, "%s: %s", b->options->port, why);
+    record_event(b, b->device_says);
     b->next_try_us = b->now_us + TRY_AGAIN_US;
     dr_guard_link(&b->guard, bridge_now(b), b->host.opens > 0, false);
 }
@@ -86,7 +126,11 @@ static bool is_stop(const uint8_t *bytes, size_t count)
 
 static void send_device(bridge *b, const uint8_t *bytes, size_t count)
 {
-    if (b->device.fd >= 0 && !device_write(&b->device, bytes, count))
+    if (b->device.fd < 0)
+        return;
+    if (device_write(&b->device, bytes, count))
+        record_bytes(b, '>', bytes, count);
+    else
         lose_device(b, "it takes no more bytes, or is gone");
 }
 
@@ -153,6 +197,8 @@ static void listen_to_device(bridge *b)
 {
     uint8_t bytes[CHUNK];
     const ssize_t count = device_read(&b->device, bytes, sizeof bytes);
+    if (count > 0)
+        record_bytes(b, '<', bytes, (size_t)count);
     if (count > 0)
         dr_guard_push_device(&b->guard, bridge_now(b), bytes, (size_t)count);
     else if (count < 0)
@@ -233,8 +279,10 @@ static void serve(bridge *b, const struct pollfd *fds)
         (void)pty_flush(&b->host);
     if (b->device.fd >= 0 && fds[FD_DEVICE].fd == b->device.fd && fds[FD_DEVICE].revents != 0)
         listen_to_device(b);
-    if (b->device.fd < 0 && b->now_us >= b->next_try_us && try_device(b) == DRYRIG_OK)
+    if (b->device.fd < 0 && b->now_us >= b->next_try_us && try_device(b) == DRYRIG_OK) {
+        record_event(b, "the port is there");
         tell_link(b);
+    }
     if (may_move(b) && b->now_us >= b->next_check_us) {
         b->next_check_us = b->now_us + CHECK_US;
         (void)dr_guard_self_check(&b->guard, bridge_now(b));
@@ -338,10 +386,16 @@ static int open_rest(bridge *b)
         control_close(&b->control);
         return fail("--link", why);
     }
-    const int status = journal_open(&b->journal, o->log)
-                           ? start_and_run(b, had_link || b->control.replaced)
-                           : fail(o->log, errno == EINVAL ? "is no file" : strerror(errno));
+    const bool after_crash = had_link || b->control.replaced;
+    int status;
+    if (!journal_open(&b->journal, o->log))
+        status = fail(o->log, errno == EINVAL ? "is no file" : strerror(errno));
+    else if (!open_recording(b)) /* last: it may empty a file */
+        status = fail(o->record, strerror(errno));
+    else
+        status = start_and_run(b, after_crash);
     journal_close(&b->journal);
+    recording_close(&b->recording);
     if (o->link != NULL)
         link_remove(o->link, b->host.path, link_lock);
     control_close(&b->control);

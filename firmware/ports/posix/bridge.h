@@ -2,7 +2,7 @@
  *
  *     a host program <-> pty <-> dr_guard <-> device <-> the controller
  *                                  ^  |
- *                        orders <--+  +--> journal
+ *                        orders <--+  +--> journal, recording
  *
  * Thread-safety: one bridge a process. */
 #ifndef BRIDGE_H
@@ -12,6 +12,7 @@
 #include "device.h"
 #include "journal.h"
 #include "pty.h"
+#include "recording.h"
 #include "rig.h"
 
 #include "dr_guard.h"
@@ -19,7 +20,8 @@
 #define BRIDGE_RING 256u
 
 typedef struct {
-    const char *port, *config, *link, *control, *log; /* link, control, log: NULL: without */
+    const char *port, *config;
+    const char *link, *control, *log, *record; /* NULL: without */
 } bridge_options;
 
 typedef enum { ORDER_NONE, ORDER_ARM, ORDER_CLEAR } order_kind;
@@ -33,6 +35,7 @@ typedef struct {
     device device;
     control control;
     journal journal;
+    recording recording; /* of the controller's line */
 
     uint64_t epoch_us, now_us;     /* of the monotonic clock; since then, when the present event came */
     uint64_t next_try_us;          /* to open the device again */

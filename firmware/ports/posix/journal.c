@@ -23,6 +23,7 @@ bool journal_open(journal *j, const char *path)
     j->fd = -1;
     if (path == NULL)
         return true;
+    j->created = access(path, F_OK) != 0 ? path : NULL;
     /* Not waiting: a pipe without a reader is refused, and so is what is no file. */
     j->fd = open(path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, 0644);
     if (j->fd >= 0 && fstat(j->fd, &is) == 0 && S_ISREG(is.st_mode))
@@ -37,6 +38,8 @@ void journal_close(journal *j)
 {
     if (j->fd >= 0)
         (void)close(j->fd);
+    if (j->fd >= 0 && j->created != NULL && j->count == 0)
+        (void)unlink(j->created);
     j->fd = -1;
 }
 
@@ -74,7 +77,10 @@ static bool write_line(const journal *j, const rig *r, const journal_entry *entr
         return false;
     if (j->has_failed && write(j->fd, "\n", 1) != 1) /* the last line may have been cut off */
         return false;
-    return write(j->fd, line, (size_t)length) == (ssize_t)length;
+    const ssize_t written = write(j->fd, line, (size_t)length);
+    if (written >= 0 && written < length)
+        errno = ENOSPC;
+    return written == length;
 }
 
 bool journal_add(journal *j, const rig *r, const dr_record *record, uint64_t wall_us)

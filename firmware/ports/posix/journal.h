@@ -18,13 +18,14 @@ typedef struct {
 } journal_entry;
 
 typedef struct {
-    int fd;          /* -1: no file */
-    bool has_failed; /* the file could not be written */
-    uint64_t count;  /* entries so far; the last JOURNAL_KEPT are kept */
+    int fd;              /* -1: no file */
+    bool has_failed;     /* the file could not be written */
+    const char *created; /* a file that was not there before; it goes if nothing is ever written */
+    uint64_t count;      /* entries so far; the last JOURNAL_KEPT are kept */
     journal_entry kept[JOURNAL_KEPT];
 } journal;
 
-/* path NULL: in memory only. A file is appended to. False: errno says why. */
+/* path NULL: in memory only; it stays the caller's. A file is appended to. False: errno says why. */
 bool journal_open(journal *j, const char *path);
 void journal_close(journal *j);
 /* False, from then on: the file cannot be written (errno says why); tries again at the next record. */

@@ -59,7 +59,7 @@ static unsigned read_number(const struct argp_state *state, const char *name, co
 
 /* -- run --------------------------------------------------------------------------------------------------------------- */
 
-enum { PORT = 256, CONFIG, LINK, CONTROL, LOG, FROM, DRIVE, ANGLE, IN_TISSUE, MAY_CALIBRATE, FOLLOW, JSON };
+enum { PORT = 256, CONFIG, LINK, CONTROL, LOG, RECORD, FROM, DRIVE, ANGLE, IN_TISSUE, MAY_CALIBRATE, FOLLOW, JSON };
 
 static error_t parse_run(int key, char *value, struct argp_state *state)
 {
@@ -79,6 +79,9 @@ static error_t parse_run(int key, char *value, struct argp_state *state)
         break;
     case LOG:
         once(state, &o->log, "--log", value);
+        break;
+    case RECORD:
+        once(state, &o->record, "--record", value);
         break;
     case ARGP_KEY_ARG:
         argp_error(state, "'%s' is no option, and none of check, explain, ctl, log", value);
@@ -105,6 +108,10 @@ static int run(int argc, char **argv)
          "Take orders at this Unix socket: see 'dryrig-guard ctl'. Without it nothing can arm", 2},
         {"log", LOG, "FILE", 0, "Append what happens to FILE, one line a record; 'dryrig-guard log FILE' verifies it",
          2},
+        {"record", RECORD, "FILE", 0,
+         "Write the bytes on the controller's line and their times to FILE, for 'dryrig decode' and 'dryrig-emu "
+         "replay'",
+         2},
         {NULL, 0, NULL, 0, NULL, 0}};
     static const struct argp argp = {known,
                                      parse_run,
@@ -119,7 +126,7 @@ static int run(int argc, char **argv)
                                      NULL,
                                      NULL};
     static bridge b;
-    bridge_options o = {NULL, NULL, NULL, NULL, NULL};
+    bridge_options o = {NULL, NULL, NULL, NULL, NULL, NULL};
     (void)argp_parse(&argp, argc, argv, 0, NULL, &o);
     return read_config(&b.rig, o.config) ? bridge_run(&b, &o) : EXIT_CONFIG;
 }

@@ -3,10 +3,10 @@
 
 #include "dr_words.h"
 #include "guard_words.h"
+#include "say.h"
 
 #include <cjson/cJSON.h>
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -361,19 +361,6 @@ void orders_take(void *context, control_client *who, const char *line)
 }
 
 /* -- Telling people ---------------------------------------------------------------------------------------------------- */
-
-/* Never waits: what a terminal or pipe does not take now is not said. */
-__attribute__((format(printf, 1, 2))) static void say(const char *format, ...)
-{
-    char text[2 * GUARD_WORDS_MAX];
-    struct pollfd can = {STDERR_FILENO, POLLOUT, 0};
-    va_list arguments;
-    va_start(arguments, format);
-    const int length = vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    if (length > 0 && poll(&can, 1, 0) == 1 && (can.revents & POLLOUT) != 0)
-        (void)!write(STDERR_FILENO, text, (size_t)length < sizeof text ? (size_t)length : sizeof text - 1);
-}
 
 static bool is_same(const dr_guard_status *a, const dr_guard_status *b)
 {

@@ -1,6 +1,6 @@
-/* dr_record: what is written can be read, and what cannot be read is named with its line. The lines are those of the
- * description in dr_record.h. */
-#include "dr_record.h"
+/* dr_recording: what is written can be read, and what cannot be read is named with its line. The lines are those of the
+ * description in dr_recording.h. */
+#include "dr_recording.h"
 
 #include "unity.h"
 
@@ -15,24 +15,24 @@ void setUp(void)
 }
 void tearDown(void) { (void)fclose(file); }
 
-static dr_record_reader reader_of(const char *text)
+static dr_recording_reader reader_of(const char *text)
 {
-    dr_record_reader reader;
+    dr_recording_reader reader;
     TEST_ASSERT_GREATER_OR_EQUAL(0, fputs(text, file));
     rewind(file);
-    (void)dr_record_open(&reader, file);
+    (void)dr_recording_open(&reader, file);
     return reader;
 }
 
 /* The first record behind line 1 is wrong. */
 static void is_wrong(const char *line, const char *why)
 {
-    char text[DR_RECORD_LINE * 2];
-    dr_record r;
+    char text[DR_RECORDING_LINE * 2];
+    dr_recorded r;
     rewind(file);
     (void)snprintf(text, sizeof text, "dryrig-recording 1\n# nothing\n\n%s\n", line);
-    dr_record_reader reader = reader_of(text);
-    TEST_ASSERT_FALSE_MESSAGE(dr_record_next(&reader, &r), line);
+    dr_recording_reader reader = reader_of(text);
+    TEST_ASSERT_FALSE_MESSAGE(dr_recording_next(&reader, &r), line);
     TEST_ASSERT_EQUAL_STRING(why, reader.why);
     TEST_ASSERT_EQUAL(4, reader.line);
 }
@@ -41,11 +41,11 @@ static void it_is_written_as_described(void)
 {
     static const uint8_t answer[] = {0x01, 0x80, 0x0D};
     char text[400] = "";
-    TEST_ASSERT_TRUE(dr_record_begin(file));
-    TEST_ASSERT_TRUE(dr_record_set(file, "mpc", "firmware", "3.21"));
-    TEST_ASSERT_TRUE(dr_record_bytes(file, 2340, 2391, "mpc", DR_RECORD_FROM_HOST, (const uint8_t *)"C", 1));
-    TEST_ASSERT_TRUE(dr_record_bytes(file, 3512, 3570, "mpc", DR_RECORD_TO_HOST, answer, sizeof answer));
-    TEST_ASSERT_TRUE(dr_record_event(file, 7200000001, 500061, "mpc", "the port has been opened"));
+    TEST_ASSERT_TRUE(dr_recording_begin(file));
+    TEST_ASSERT_TRUE(dr_recording_set(file, "mpc", "firmware", "3.21"));
+    TEST_ASSERT_TRUE(dr_recording_bytes(file, 2340, 2391, "mpc", DR_RECORDING_FROM_HOST, (const uint8_t *)"C", 1));
+    TEST_ASSERT_TRUE(dr_recording_bytes(file, 3512, 3570, "mpc", DR_RECORDING_TO_HOST, answer, sizeof answer));
+    TEST_ASSERT_TRUE(dr_recording_event(file, 7200000001, 500061, "mpc", "the port has been opened"));
     rewind(file);
     (void)fread(text, 1, sizeof text - 1, file);
     TEST_ASSERT_EQUAL_STRING("dryrig-recording 1\n"
@@ -58,34 +58,34 @@ static void it_is_written_as_described(void)
 
 static void what_is_written_can_be_read(void)
 {
-    uint8_t bytes[DR_RECORD_BYTES + 1];
-    dr_record_reader reader;
-    dr_record r;
+    uint8_t bytes[DR_RECORDING_BYTES + 1];
+    dr_recording_reader reader;
+    dr_recorded r;
     for (size_t i = 0; i < sizeof bytes; i++)
         bytes[i] = (uint8_t)(i * 4u);
-    TEST_ASSERT_TRUE(dr_record_begin(file));
-    TEST_ASSERT_TRUE(dr_record_set(file, "left", "position", "1,2,3"));
-    TEST_ASSERT_TRUE(dr_record_bytes(file, 1, 2, "left", DR_RECORD_LOST, bytes, sizeof bytes));
-    TEST_ASSERT_TRUE(dr_record_event(file, 3, 4, "left", "power off"));
+    TEST_ASSERT_TRUE(dr_recording_begin(file));
+    TEST_ASSERT_TRUE(dr_recording_set(file, "left", "position", "1,2,3"));
+    TEST_ASSERT_TRUE(dr_recording_bytes(file, 1, 2, "left", DR_RECORDING_LOST, bytes, sizeof bytes));
+    TEST_ASSERT_TRUE(dr_recording_event(file, 3, 4, "left", "power off"));
     rewind(file);
-    TEST_ASSERT_TRUE(dr_record_open(&reader, file));
-    TEST_ASSERT_TRUE(dr_record_next(&reader, &r));
+    TEST_ASSERT_TRUE(dr_recording_open(&reader, file));
+    TEST_ASSERT_TRUE(dr_recording_next(&reader, &r));
     TEST_ASSERT_EQUAL('s', r.kind);
     TEST_ASSERT_EQUAL_STRING("left", r.name);
     TEST_ASSERT_EQUAL_STRING("position", r.key);
     TEST_ASSERT_EQUAL_STRING("1,2,3", r.text);
-    TEST_ASSERT_TRUE(dr_record_next(&reader, &r));
+    TEST_ASSERT_TRUE(dr_recording_next(&reader, &r));
     TEST_ASSERT_EQUAL('!', r.kind);
-    TEST_ASSERT_EQUAL(DR_RECORD_BYTES, r.count);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(bytes, r.bytes, DR_RECORD_BYTES);
-    TEST_ASSERT_TRUE(dr_record_next(&reader, &r)); /* the rest of the same instant */
+    TEST_ASSERT_EQUAL(DR_RECORDING_BYTES, r.count);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(bytes, r.bytes, DR_RECORDING_BYTES);
+    TEST_ASSERT_TRUE(dr_recording_next(&reader, &r)); /* the rest of the same instant */
     TEST_ASSERT_EQUAL_UINT64(1, r.when_us);
     TEST_ASSERT_EQUAL_UINT64(2, r.real_us);
     TEST_ASSERT_EQUAL(1, r.count);
-    TEST_ASSERT_EQUAL_HEX8(bytes[DR_RECORD_BYTES], r.bytes[0]);
-    TEST_ASSERT_TRUE(dr_record_next(&reader, &r));
+    TEST_ASSERT_EQUAL_HEX8(bytes[DR_RECORDING_BYTES], r.bytes[0]);
+    TEST_ASSERT_TRUE(dr_recording_next(&reader, &r));
     TEST_ASSERT_EQUAL_STRING("power off", r.text);
-    TEST_ASSERT_FALSE(dr_record_next(&reader, &r));
+    TEST_ASSERT_FALSE(dr_recording_next(&reader, &r));
     TEST_ASSERT_EQUAL_STRING("", reader.why);
 }
 
@@ -113,10 +113,11 @@ static void lines_that_are_wrong_are_named(void)
 
 static void a_line_without_its_end_is_torn_off(void)
 {
-    dr_record r;
-    dr_record_reader reader = reader_of("dryrig-recording 1\n0.000001 0.000000 mpc > 43\n0.000002 0.000000 mpc < 01");
-    TEST_ASSERT_TRUE(dr_record_next(&reader, &r));
-    TEST_ASSERT_FALSE(dr_record_next(&reader, &r));
+    dr_recorded r;
+    dr_recording_reader reader =
+        reader_of("dryrig-recording 1\n0.000001 0.000000 mpc > 43\n0.000002 0.000000 mpc < 01");
+    TEST_ASSERT_TRUE(dr_recording_next(&reader, &r));
+    TEST_ASSERT_FALSE(dr_recording_next(&reader, &r));
     TEST_ASSERT_EQUAL_STRING("the line is torn off: the recording ended in it", reader.why);
     TEST_ASSERT_EQUAL(3, reader.line);
 }

@@ -1,4 +1,4 @@
-#include "dr_record.h"
+#include "dr_recording.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -10,46 +10,46 @@
 
 /* -- Writing ------------------------------------------------------------------------------------------------------------- */
 
-bool dr_record_begin(FILE *file) { return fprintf(file, MAGIC "%d\n", DR_RECORD_VERSION) > 0; }
+bool dr_recording_begin(FILE *file) { return fprintf(file, MAGIC "%d\n", DR_RECORDING_VERSION) > 0; }
 
-bool dr_record_set(FILE *file, const char *name, const char *key, const char *value)
+bool dr_recording_set(FILE *file, const char *name, const char *key, const char *value)
 {
     return fprintf(file, "set %s %s %s\n", name, key, value) > 0;
 }
 
-static bool put_head(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, dr_record_kind kind)
+static bool put_head(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, dr_recorded_kind kind)
 {
     return fprintf(file, "%llu.%06u %llu.%06u %s %c", (unsigned long long)(when_us / US_PER_S),
                    (unsigned)(when_us % US_PER_S), (unsigned long long)(real_us / US_PER_S),
                    (unsigned)(real_us % US_PER_S), name, (char)kind) > 0;
 }
 
-bool dr_record_bytes(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, dr_record_kind kind,
-                     const uint8_t *bytes, size_t count)
+bool dr_recording_bytes(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, dr_recorded_kind kind,
+                        const uint8_t *bytes, size_t count)
 {
     bool done = true;
     for (size_t at = 0; at < count; at++) {
-        if (at % DR_RECORD_BYTES == 0)
+        if (at % DR_RECORDING_BYTES == 0)
             done = put_head(file, when_us, real_us, name, kind) && done;
         done = fprintf(file, " %02X", (unsigned)bytes[at]) > 0 && done;
-        if (at % DR_RECORD_BYTES == DR_RECORD_BYTES - 1u || at == count - 1u)
+        if (at % DR_RECORDING_BYTES == DR_RECORDING_BYTES - 1u || at == count - 1u)
             done = fputc('\n', file) != EOF && done;
     }
     return done;
 }
 
-bool dr_record_event(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, const char *text)
+bool dr_recording_event(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, const char *text)
 {
-    return put_head(file, when_us, real_us, name, DR_RECORD_EVENT) && fprintf(file, " %s\n", text) > 0;
+    return put_head(file, when_us, real_us, name, DR_RECORDING_EVENT) && fprintf(file, " %s\n", text) > 0;
 }
 
 /* -- Reading ------------------------------------------------------------------------------------------------------------- */
 
 #if defined(__GNUC__)
-static bool wrong(dr_record_reader *reader, const char *format, ...) __attribute__((format(printf, 2, 3)));
+static bool wrong(dr_recording_reader *reader, const char *format, ...) __attribute__((format(printf, 2, 3)));
 #endif
 
-static bool wrong(dr_record_reader *reader, const char *format, ...)
+static bool wrong(dr_recording_reader *reader, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -60,24 +60,24 @@ static bool wrong(dr_record_reader *reader, const char *format, ...)
 }
 
 /* A line without its line feed. False: the end, or why[]. */
-static bool get_line(dr_record_reader *reader, char line[DR_RECORD_LINE])
+static bool get_line(dr_recording_reader *reader, char line[DR_RECORDING_LINE])
 {
-    if (fgets(line, (int)DR_RECORD_LINE, reader->file) == NULL)
+    if (fgets(line, (int)DR_RECORDING_LINE, reader->file) == NULL)
         return ferror(reader->file) != 0 ? wrong(reader, "it cannot be read") : false;
     reader->line++;
     const size_t length = strlen(line);
     if (length == 0 || line[length - 1u] != '\n')
         return feof(reader->file) != 0 ? wrong(reader, "the line is torn off: the recording ended in it")
-                                       : wrong(reader, "the line is longer than %u characters", DR_RECORD_LINE - 2u);
+                                       : wrong(reader, "the line is longer than %u characters", DR_RECORDING_LINE - 2u);
     line[length - 1u] = '\0';
     if (length > 1 && line[length - 2u] == '\r')
         line[length - 2u] = '\0';
     return true;
 }
 
-bool dr_record_open(dr_record_reader *reader, FILE *file)
+bool dr_recording_open(dr_recording_reader *reader, FILE *file)
 {
-    char line[DR_RECORD_LINE];
+    char line[DR_RECORDING_LINE];
     memset(reader, 0, sizeof *reader);
     reader->file = file;
     if (!get_line(reader, line))
@@ -86,7 +86,7 @@ bool dr_record_open(dr_record_reader *reader, FILE *file)
         return wrong(reader, "it is no recording: one begins with '" MAGIC "1'");
     if (strcmp(line + strlen(MAGIC), "1") != 0)
         return wrong(reader, "its version is '%.16s'; this program knows version %d", line + strlen(MAGIC),
-                     DR_RECORD_VERSION);
+                     DR_RECORDING_VERSION);
     return true;
 }
 
@@ -129,31 +129,31 @@ static int hex_digit(char c)
     return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-static bool read_bytes(dr_record_reader *reader, char *text, dr_record *out)
+static bool read_bytes(dr_recording_reader *reader, char *text, dr_recorded *out)
 {
     while (*text != '\0') {
         const char *const word = next_word(&text);
         const int high = hex_digit(word[0]), low = high < 0 ? -1 : hex_digit(word[1]);
         if (low < 0 || word[2] != '\0')
             return wrong(reader, "'%.16s' is no byte: two hexadecimal digits, with a blank between bytes", word);
-        if (out->count == DR_RECORD_BYTES)
-            return wrong(reader, "more than %u bytes in one line", DR_RECORD_BYTES);
+        if (out->count == DR_RECORDING_BYTES)
+            return wrong(reader, "more than %u bytes in one line", DR_RECORDING_BYTES);
         out->bytes[out->count++] = (uint8_t)(high * 16 + low);
     }
     return out->count > 0 || wrong(reader, "bytes are missing");
 }
 
-static bool read_name(dr_record_reader *reader, const char *word, dr_record *out)
+static bool read_name(dr_recording_reader *reader, const char *word, dr_recorded *out)
 {
     if (*word == '\0' || strlen(word) >= sizeof out->name)
-        return wrong(reader, "a controller's name is missing, or longer than %u characters", DR_RECORD_NAME - 1u);
+        return wrong(reader, "a controller's name is missing, or longer than %u characters", DR_RECORDING_NAME - 1u);
     (void)snprintf(out->name, sizeof out->name, "%s", word);
     return true;
 }
 
-static bool read_setting(dr_record_reader *reader, char *at, dr_record *out)
+static bool read_setting(dr_recording_reader *reader, char *at, dr_recorded *out)
 {
-    out->kind = DR_RECORD_SETTING;
+    out->kind = DR_RECORDING_SETTING;
     if (!read_name(reader, next_word(&at), out))
         return false;
     const char *const key = next_word(&at);
@@ -164,7 +164,7 @@ static bool read_setting(dr_record_reader *reader, char *at, dr_record *out)
     return true;
 }
 
-static bool read_line(dr_record_reader *reader, char *at, dr_record *out)
+static bool read_line(dr_recording_reader *reader, char *at, dr_recorded *out)
 {
     const char *const first = next_word(&at);
     if (strcmp(first, "set") == 0)
@@ -177,15 +177,15 @@ static bool read_line(dr_record_reader *reader, char *at, dr_record *out)
     if (strlen(kind) != 1 || strchr("<>!-", kind[0]) == NULL)
         return wrong(reader, "'%.16s' is none of > < ! -", kind);
     out->kind = (uint8_t)kind[0];
-    if (out->kind != DR_RECORD_EVENT)
+    if (out->kind != DR_RECORDING_EVENT)
         return read_bytes(reader, at, out);
     (void)snprintf(out->text, sizeof out->text, "%s", at);
     return true;
 }
 
-bool dr_record_next(dr_record_reader *reader, dr_record *out)
+bool dr_recording_next(dr_recording_reader *reader, dr_recorded *out)
 {
-    char line[DR_RECORD_LINE];
+    char line[DR_RECORDING_LINE];
     while (get_line(reader, line)) { /* to the first that means something */
         if (line[0] == '\0' || line[0] == '#')
             continue;

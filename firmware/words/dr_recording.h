@@ -1,4 +1,4 @@
-/* dr_record: recordings of what went over the line, both directions, with times. One line of text each:
+/* dr_recording: recordings of what went over the line, both directions, with times. One line of text each:
  *
  *     dryrig-recording 1
  *     set mpc controller mpc
@@ -20,8 +20,8 @@
  * all before it is good.
  *
  * Not for small boards: stdio. Errors: false, and errno or why[] says. Thread-safety: one thread at a time per file. */
-#ifndef DR_RECORD_H
-#define DR_RECORD_H
+#ifndef DR_RECORDING_H
+#define DR_RECORDING_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -32,49 +32,49 @@
 extern "C" {
 #endif
 
-#define DR_RECORD_VERSION 1
-#define DR_RECORD_BYTES 64u /* in one line; more make more lines of the same instant */
-#define DR_RECORD_NAME 64u
-#define DR_RECORD_LINE 512u
+#define DR_RECORDING_VERSION 1
+#define DR_RECORDING_BYTES 64u /* in one line; more make more lines of the same instant */
+#define DR_RECORDING_NAME 64u
+#define DR_RECORDING_LINE 512u
 
 typedef enum {
-    DR_RECORD_SETTING = 's',
-    DR_RECORD_FROM_HOST = '>',
-    DR_RECORD_TO_HOST = '<',
-    DR_RECORD_LOST = '!',
-    DR_RECORD_EVENT = '-'
-} dr_record_kind;
+    DR_RECORDING_SETTING = 's',
+    DR_RECORDING_FROM_HOST = '>',
+    DR_RECORDING_TO_HOST = '<',
+    DR_RECORDING_LOST = '!',
+    DR_RECORDING_EVENT = '-'
+} dr_recorded_kind;
 
 /* -- Writing: false: errno says why -------------------------------------------------------------------------------------- */
 
-bool dr_record_begin(FILE *file);
-bool dr_record_set(FILE *file, const char *name, const char *key, const char *value);
-bool dr_record_bytes(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, dr_record_kind kind,
-                     const uint8_t *bytes, size_t count);
-bool dr_record_event(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, const char *text);
+bool dr_recording_begin(FILE *file);
+bool dr_recording_set(FILE *file, const char *name, const char *key, const char *value);
+bool dr_recording_bytes(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, dr_recorded_kind kind,
+                        const uint8_t *bytes, size_t count);
+bool dr_recording_event(FILE *file, uint64_t when_us, uint64_t real_us, const char *name, const char *text);
 
 /* -- Reading ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    uint8_t kind; /* dr_record_kind */
+    uint8_t kind; /* dr_recorded_kind */
     uint64_t when_us, real_us;
-    char name[DR_RECORD_NAME];
-    uint8_t bytes[DR_RECORD_BYTES];
+    char name[DR_RECORDING_NAME];
+    uint8_t bytes[DR_RECORDING_BYTES];
     size_t count;
-    char key[32];              /* SETTING */
-    char text[DR_RECORD_LINE]; /* SETTING: its value; EVENT */
-} dr_record;
+    char key[32];                 /* SETTING */
+    char text[DR_RECORDING_LINE]; /* SETTING: its value; EVENT */
+} dr_recorded;
 
 typedef struct {
     FILE *file;
     unsigned line;
     char why[160]; /* what is wrong with this line */
-} dr_record_reader;
+} dr_recording_reader;
 
 /* Reads line 1. False: reader->why says what this is instead. */
-bool dr_record_open(dr_record_reader *reader, FILE *file);
+bool dr_recording_open(dr_recording_reader *reader, FILE *file);
 /* The next record. False: there is none; reader->why is empty at the end of the file, and says what is wrong before it. */
-bool dr_record_next(dr_record_reader *reader, dr_record *out);
+bool dr_recording_next(dr_recording_reader *reader, dr_recorded *out);
 
 #ifdef __cplusplus
 }
