@@ -663,6 +663,55 @@ static void asking_for_a_drive_that_is_not_there_is_right(void)
     found_nothing();
 }
 
+/* -- Both sides of every rule -------------------------------------------------------------------------------------------- */
+
+static void an_s_behind_an_o_assumes_nothing(void)
+{
+    start(DR_MPC);
+    ask("O");
+    bench_line(&b, 15, 1600, 0, 0, 30000);
+    found_nothing();
+}
+
+/* A rule that is new must come with its two programs. */
+static void every_rule_has_a_program_that_breaks_it_and_one_that_nearly_does(void)
+{
+    static void (*const programs[LINT_RULES][2])(void) = {
+        [LINT_EARLY_COMMAND] = {a_command_during_a_move_is_early, a_command_2_ms_after_the_cr_is_not_early},
+        [LINT_HURRIED_COMMAND] = {less_than_2_ms_after_an_answer_is_hurried, exactly_2_ms_after_an_answer_is_not},
+        [LINT_NO_PAUSE_IN_S] = {an_s_with_19_999_ms_of_pause_lacks_some, an_s_with_20_ms_of_pause_is_taken},
+        [LINT_BEYOND_TRAVEL] = {one_step_beyond_the_travel_is_beyond, the_ends_of_travel_are_not_beyond},
+        [LINT_SWAPPED_BYTES] = {coordinates_most_significant_byte_first_look_swapped,
+                                beyond_the_travel_both_ways_round_is_not_swapped},
+        [LINT_SHORT_TIME_LIMIT] = {who_waits_and_gives_up_too_early_has_a_short_time_limit,
+                                   who_gives_up_and_interrupts_has_done_right},
+        [LINT_UNREAD_REPLY] = {a_cr_that_is_not_read_is_left, closing_when_all_is_read_leaves_nothing},
+        [LINT_WRONG_COMMAND] = {a_command_of_another_firmware_is_wrong, a_command_of_this_firmware_is_right},
+        [LINT_UPPER_CASE_AXIS] = {upper_case_axes_of_a_trio_are_named, lower_case_axes_and_an_upper_case_c_are_right},
+        [LINT_ANGLE_EXTREME] = {angles_of_0_and_90_and_above_are_named, angles_of_1_and_89_are_right},
+        [LINT_WORK_WITHOUT_HOME] = {work_needs_a_home_before_it, work_right_after_home_is_right},
+        [LINT_SMALL_MOVE] = {a_move_of_15_steps_is_small, a_move_of_16_steps_on_one_axis_is_not_small},
+        [LINT_QUERY_IN_MOVE] = {a_query_during_a_move_is_named, a_command_2_ms_after_the_cr_is_not_early},
+        [LINT_STREAMING_ASSUMED] = {an_s_without_f_or_o_assumes_streaming_once, an_s_behind_an_o_assumes_nothing},
+        [LINT_WRONG_BAUD] = {another_baud_rate_is_wrong, the_controllers_baud_rates_are_right},
+        [LINT_THIRTEEN_BYTES] = {a_program_that_reads_13_bytes_of_14_is_named,
+                                 a_program_that_reads_12_bytes_of_14_leaves_2_unread},
+        [LINT_NO_WORK_POSITION] = {work_of_a_trio_needs_a_work_position_too,
+                                   work_of_a_trio_with_a_work_position_is_right},
+        [LINT_SPEED_TOO_HIGH] = {a_speed_of_16_is_too_high, a_speed_of_15_is_not},
+        [LINT_VALUE_OUT_OF_RANGE] = {digits_are_no_drives_and_10_is_no_mode,
+                                     asking_for_a_drive_that_is_not_there_is_right}};
+    for (unsigned rule = 0; rule < LINT_RULES; rule++)
+        for (unsigned nearly = 0; nearly < 2; nearly++) {
+            const char *const name = lint_words_of((lint_rule)rule)->name;
+            TEST_ASSERT_NOT_NULL_MESSAGE(programs[rule][nearly], name);
+            tearDown();
+            setUp();
+            programs[rule][nearly]();
+            TEST_ASSERT_EQUAL_MESSAGE(nearly == 0, l.counts[rule] > 0, name);
+        }
+}
+
 /* -- Findings ---------------------------------------------------------------------------------------------------------- */
 
 static void findings_beyond_the_bound_are_counted(void)
@@ -749,6 +798,8 @@ int main(void)
     RUN_TEST(a_speed_of_15_is_not);
     RUN_TEST(digits_are_no_drives_and_10_is_no_mode);
     RUN_TEST(asking_for_a_drive_that_is_not_there_is_right);
+    RUN_TEST(an_s_behind_an_o_assumes_nothing);
+    RUN_TEST(every_rule_has_a_program_that_breaks_it_and_one_that_nearly_does);
     RUN_TEST(findings_beyond_the_bound_are_counted);
     RUN_TEST(a_dark_controller_judges_nobody);
     return UNITY_END();
