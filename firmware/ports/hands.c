@@ -4,13 +4,18 @@
 #include "emulator.h"
 #include "port.h"
 
-enum { KNOBS = (DR_PORT_INPUTS - DR_INPUT_KNOB_X) / 2 };
+#define KNOB_COUNT ((DR_PORT_INPUTS - DR_INPUT_KNOB_X) / 2u)
+#define BUTTONS ((1u << DR_INPUT_KNOB_X) - 1u)
+#define KNOBS (0xFFFFu - BUTTONS)
 enum { OUTPUT_BUZZER = 1u << 0, OUTPUT_LED = 1u << 1 };
 
 static dr_panel panel;
 static dr_panel_drive drives[DR_PORTS];
 static dr_contacts buttons;
-static dr_encoder knobs[KNOBS];
+static dr_encoder knobs[KNOB_COUNT];
+static uint16_t seen; /* of the inputs, at the last look */
+static bool has_due;  /* the panel has something to do by itself, */
+static dr_us due;     /* at this instant */
 static dr_us looked, beeped;
 static uint8_t beeps; /* that were heard */
 static uint8_t outputs;
@@ -32,17 +37,18 @@ static void press(dr_us now, uint8_t input, bool down)
     }
 }
 
-static void look(dr_us now)
+/* Returns whether a hand has done anything. What an AVR does here a thousand times a second it does not have for a stream. */
+static bool look(dr_us now)
 {
     const uint16_t inputs = dr_port_inputs();
-    const uint16_t changed = dr_contacts_look(&buttons, inputs);
-    bool is_used = false;
-    for (uint8_t input = 0; input < DR_INPUT_KNOB_X; input++)
-        if ((changed >> input & 1u) != 0) {
+    const uint16_t changed = dr_contacts_look(&buttons, inputs) & BUTTONS;
+    const uint16_t turned = (inputs ^ seen) & KNOBS;
+    bool is_used = changed != 0;
+    seen = inputs;
+    for (uint8_t input = 0; changed != 0 && input < DR_INPUT_KNOB_X; input++)
+        if ((changed >> input & 1u) != 0)
             press(now, input, (buttons.closed >> input & 1u) != 0);
-            is_used = true;
-        }
-    for (uint8_t i = 0; i < KNOBS; i++) {
+    for (uint8_t i = 0; turned != 0 && i < KNOB_COUNT; i++) {
         const unsigned pair = (unsigned)inputs >> (DR_INPUT_KNOB_X + 2u * i);
         const int8_t detents = dr_encoder_look(&knobs[i], (pair & 1u) != 0, (pair & 2u) != 0);
         if (detents == 0)
@@ -50,8 +56,7 @@ static void look(dr_us now)
         (void)dr_panel_turn(&panel, now, (dr_knob)(is_trio() || i < DR_KNOB_D ? i : i + 1u), detents);
         is_used = true;
     }
-    if (is_used || panel.beeps != beeps) /* a hold acts, and beeps, while nothing changes */
-        dr_emulator_touch(now);
+    return is_used;
 }
 
 static void show(dr_us now)
@@ -76,26 +81,32 @@ static void show(dr_us now)
 
 void dr_hands_begin(void)
 {
-    dr_controller *c = dr_emulator_prepare();
-    dr_panel_init(&panel, c, drives);
-    const uint16_t inputs = dr_port_inputs();
-    dr_contacts_init(&buttons, inputs); /* what is pressed by now was not pressed with the power on */
-    for (uint8_t i = 0; i < KNOBS; i++)
+    dr_panel_init(&panel, dr_emulator_prepare(), drives);
+    dr_contacts_init(&buttons, dr_port_inputs()); /* what is pressed by now was not pressed with the power on */
+    for (uint8_t i = 0; i < KNOB_COUNT; i++)
         knobs[i] = (dr_encoder){0, 0};
     looked = dr_port_now_us();
     beeps = panel.beeps;
+    seen = 0;
     outputs = 0;
+    has_due = false;
     dr_panel_power(&panel, looked, true);
 }
 
 void dr_hands_step(void)
 {
     const dr_us now = dr_port_now_us();
-    dr_panel_settle(&panel, now);
+    bool is_used = has_due && !dr_us_before(now, due);
+    if (is_used)
+        dr_panel_settle(&panel, now);
     if (now - looked >= DR_LOOK_US) {
         looked = now;
-        look(now);
+        is_used = look(now) || is_used;
         show(now);
+    }
+    if (is_used) {
+        has_due = dr_panel_due(&panel, &due);
+        dr_emulator_touch(now);
     }
     dr_emulator_loop(now, true, looked + DR_LOOK_US);
 }

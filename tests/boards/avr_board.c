@@ -6,12 +6,14 @@
  *         does it; otherwise UART 0.
  *     avr_board [--usb] [--memory FILE] --script FILE MCU IMAGE.elf
  *         The line is a script, in the board's own time: a line "US HEX..." sends these bytes from that microsecond on, at
- *         the rate the board has set; "US stop" ends the run, "US off" cuts the power there. Prints "US HEX" for each byte
- *         that the board sends: the moment it is whole on the line. The same run gives the same output, to the cycle.
+ *         the rate the board has set; "US low PIN..." connects these pins of the chip to ground from then on, "US open
+ *         PIN..." no longer; "US stop" ends the run, "US off" cuts the power there. Prints "US HEX" for each byte that the
+ *         board sends: the moment it is whole on the line. The same run gives the same output, to the cycle.
  *     avr_board --program MCU IMAGE.elf
  *         Runs a program to its end (sleep without interrupts); prints what it writes to UART 0; exits with its GPIOR0.
  *
- * --low PIN...: these pins of the chip are connected to ground; D2E4 is bit 2 of port D and bit 4 of port E.
+ * --low PIN...: these pins of the chip are connected to ground from the start; D2E4 is bit 2 of port D and bit 4 of port E.
+ * --watch PIN...: in a script's run, prints "US PIN LEVEL" for each change of these pins, which the board drives.
  * --memory FILE: the EEPROM, read at the start, written at the end. At the end says on stderr how deep the stack was. */
 #define _DEFAULT_SOURCE /* openpty, cfmakeraw */
 #include <errno.h>
@@ -342,6 +344,43 @@ static void serve(const char *link_path, bool flat_out)
     (void)close(master);
 }
 
+/* -- Pins ------------------------------------------------------------------------------------------------------------ */
+
+/* Connects the pins that are named there to ground, or leaves them to their pull-ups. */
+static void connect_pins(const char *pins, bool to_ground)
+{
+    static uint8_t grounded[128]; /* by the port's letter */
+    while (*pins == ' ')
+        pins++;
+    for (; pins[0] >= 'A' && pins[0] <= 'L' && pins[1] >= '0' && pins[1] <= '7'; pins += 2) {
+        const uint32_t port = (uint8_t)pins[0], bit = (uint8_t)(pins[1] - '0');
+        const uint8_t mask = (uint8_t)(1u << bit);
+        grounded[port] = (uint8_t)(to_ground ? grounded[port] | mask : grounded[port] & ~mask);
+        avr_ioport_external_t ground = {.name = port & 0x7F, .mask = grounded[port], .value = 0};
+        (void)avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &ground);
+        avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), (int)bit), to_ground ? 0 : 1);
+    }
+    errno = 0;
+    if (*pins != '\0' && *pins != '\n')
+        fail("a pin is a port's letter and a bit, such as D2");
+}
+
+static void pin_changes(avr_irq_t *irq, uint32_t value, void *name)
+{
+    if (irq->value != value)
+        (void)printf("%llu %.2s %u\n", (unsigned long long)(avr->cycle / CYCLES_PER_US), (const char *)name,
+                     value & 1u);
+}
+
+static void watch_pins(const char *pins)
+{
+    for (; pins[0] != '\0' && pins[1] != '\0'; pins += 2) {
+        const uint32_t port = (uint8_t)pins[0];
+        avr_irq_t *pin = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), pins[1] - '0');
+        avr_irq_register_notify(pin, pin_changes, (void *)(uintptr_t)pins);
+    }
+}
+
 /* -- The line as a script ------------------------------------------------------------------------------------------ */
 
 static void play(FILE *script)
@@ -360,6 +399,11 @@ static void play(FILE *script)
         }
         if (strstr(rest, "stop") != NULL || strstr(rest, "off") != NULL)
             return;
+        char *low = strstr(rest, "low"), *open = strstr(rest, "open");
+        if (low != NULL || open != NULL) {
+            connect_pins(low != NULL ? low + strlen("low") : open + strlen("open"), low != NULL);
+            continue;
+        }
         for (char *at = rest;;) {
             char *next;
             const unsigned long byte = strtoul(at, &next, 16);
@@ -405,18 +449,6 @@ static void memory(const char *path, bool save)
         fail(path);
 }
 
-static void connect_to_ground(const char *pins)
-{
-    for (; pins[0] != '\0' && pins[1] != '\0'; pins += 2) {
-        uint8_t mask = (uint8_t)(1u << (pins[1] - '0'));
-        for (const char *other = pins + 2; other[0] == pins[0] && other[1] != '\0'; other += 2, pins += 2)
-            mask = (uint8_t)(mask | 1u << (other[1] - '0'));
-        const uint32_t port = (uint8_t)pins[0];
-        avr_ioport_external_t ground = {.name = port & 0x7F, .mask = mask, .value = 0};
-        (void)avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &ground);
-    }
-}
-
 static void load(const char *mcu, const char *path)
 {
     elf_firmware_t image;
@@ -435,12 +467,16 @@ static void load(const char *mcu, const char *path)
 
 int main(int argc, char **argv)
 {
-    static const struct option options[] = {
-        {"usb", no_argument, NULL, 'u'},          {"flat-out", no_argument, NULL, 'f'},
-        {"memory", required_argument, NULL, 'm'}, {"link", required_argument, NULL, 'l'},
-        {"script", required_argument, NULL, 's'}, {"program", no_argument, NULL, 'p'},
-        {"low", required_argument, NULL, 'g'},    {NULL, 0, NULL, 0}};
-    const char *pins = "", *memory_path = NULL, *link_path = NULL, *script_path = NULL;
+    static const struct option options[] = {{"usb", no_argument, NULL, 'u'},
+                                            {"flat-out", no_argument, NULL, 'f'},
+                                            {"memory", required_argument, NULL, 'm'},
+                                            {"link", required_argument, NULL, 'l'},
+                                            {"script", required_argument, NULL, 's'},
+                                            {"program", no_argument, NULL, 'p'},
+                                            {"low", required_argument, NULL, 'g'},
+                                            {"watch", required_argument, NULL, 'w'},
+                                            {NULL, 0, NULL, 0}};
+    const char *low = "", *watched = "", *memory_path = NULL, *link_path = NULL, *script_path = NULL;
     bool flat_out = false, is_program = false;
     for (int option; (option = getopt_long(argc, argv, "", options, NULL)) != -1;)
         switch (option) {
@@ -460,7 +496,10 @@ int main(int argc, char **argv)
             script_path = optarg;
             break;
         case 'g':
-            pins = optarg;
+            low = optarg;
+            break;
+        case 'w':
+            watched = optarg;
             break;
         case 'p':
             is_program = true;
@@ -473,7 +512,8 @@ int main(int argc, char **argv)
         fail("usage: avr_board [--usb] [--flat-out] [--memory FILE] [--link PATH] [--script FILE | --program] MCU "
              "IMAGE.elf");
     load(argv[optind], argv[optind + 1]);
-    connect_to_ground(pins);
+    connect_pins(low, true);
+    watch_pins(watched);
     if (memory_path != NULL)
         memory(memory_path, false);
     (void)signal(SIGTERM, stop);

@@ -2,13 +2,17 @@
 import subprocess
 
 
-def run(command, events):
-    """What the board sends: a list of (us, byte). Events: (us, bytes to send or "stop" or "off")."""
+def run(command, events, pins=None):
+    """What the board sends: a list of (us, byte). Events: (us, bytes to send, or "stop", "off", "low PIN...", "open PIN...").
+    Changes of pins that the command says to watch are added to `pins`: (us, pin, level)."""
     script = "".join(f"{us} {what if isinstance(what, str) else what.hex(' ')}\n" for us, what in events)
     done = subprocess.run(command, input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=280)
     if done.returncode:
         raise AssertionError(done.stderr)
-    return [(int(us), int(byte, 16)) for us, byte in (line.split() for line in done.stdout.splitlines())]
+    said = [line.split() for line in done.stdout.splitlines()]
+    if pins is not None:
+        pins += [(int(line[0]), line[1], int(line[2])) for line in said if len(line) == 3]
+    return [(int(line[0]), int(line[1], 16)) for line in said if len(line) == 2]
 
 
 def point(x, y, z):

@@ -1,6 +1,7 @@
 """The images of AVR boards, as they are flashed, in a simulator of the chip (avr_board), in the chip's own time.
 
-    test_avr_images.py AVR_BOARD IMAGES UNO|MEGA|LEONARDO    (IMAGES: the directory of the board's build)
+    test_avr_images.py AVR_BOARD IMAGES uno|mega|leonardo [-hands]    (IMAGES: the directory of the board's build; -hands: the
+                                                                       images with buttons, of which none is pressed)
 
 Expected answers are typed from PROTOCOL.md and the manuals [T] and [M]. Times are microseconds of the board's clock from its
 start. 57600 baud at 16 MHz are 57143, 128000 are 125000.
@@ -14,6 +15,7 @@ import images
 from images import between, point, spaced
 
 RUNNER, IMAGES, BOARD = (sys.argv.pop(1) for _ in range(3))
+HANDS = sys.argv.pop(1) if sys.argv[1:2] == ["-hands"] else ""
 MCU = {"uno": "atmega328p", "mega": "atmega2560", "leonardo": "atmega32u4"}[BOARD]
 IS_USB = BOARD == "leonardo"
 # Arduino's pins 2 to 5 as ports of the chip (the boards' circuit diagrams).
@@ -24,7 +26,7 @@ READY_US = 2_500_000  # a Leonardo is enumerated by then, and a TRIO has calibra
 def run(controller, events, memory=None, straps=()):
     low = "".join(sorted(STRAPS[number] for number in straps))
     options = [*(["--usb"] if IS_USB else []), *(["--memory", memory] if memory else []), "--low", low, "--script", "-"]
-    return images.run([RUNNER, *options, MCU, str(Path(IMAGES, f"{BOARD}-{controller}.elf"))], events)
+    return images.run([RUNNER, *options, MCU, str(Path(IMAGES, f"{BOARD}-{controller}{HANDS}.elf"))], events)
 
 
 class Commands(unittest.TestCase):
