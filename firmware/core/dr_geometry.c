@@ -123,8 +123,8 @@ bool dr_is_along(const int32_t move_q[DR_AXES], const int16_t direction[DR_AXES]
         direction_sum += size_of(direction[axis]);
     }
     for (uint8_t axis = 0; axis < DR_AXES; axis++) {
-        const uint8_t next = (uint8_t)((axis + 1u) % DR_AXES), last = (uint8_t)((axis + 2u) % DR_AXES);
-        const int64_t part = (int64_t)move_q[next] * direction[last] - (int64_t)move_q[last] * direction[next];
+        const uint8_t next = (uint8_t)((axis + 1u) % DR_AXES);
+        const int64_t part = (int64_t)move_q[axis] * direction[next] - (int64_t)move_q[next] * direction[axis];
         if (size_of(part) > direction_sum * tolerance_q)
             return false;
         squared += part * part;

@@ -2,8 +2,6 @@
 #include "dr_geometry.h"
 #include "unity.h"
 
-#include <stdlib.h>
-
 void setUp(void) {}
 void tearDown(void) {}
 
@@ -53,6 +51,64 @@ static void a_point_is_a_line_too(void)
 {
     TEST_ASSERT_TRUE(line_hits(100, 200, 150, 100, 200, 150));
     TEST_ASSERT_FALSE(line_hits(99, 200, 150, 99, 200, 150));
+}
+
+static void a_step_of_one_quantum_is_a_line_too(void)
+{
+    static const int32_t inside = 150;
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        for (int32_t face = 100; face <= 200; face += 100) {
+            const int32_t out = face == 100 ? -1 : 1;
+            int32_t from[DR_AXES] = {inside, inside, inside}, to[DR_AXES] = {inside, inside, inside};
+            from[axis] = face + out;
+            to[axis] = face;
+            TEST_ASSERT_TRUE(line_hits(from[0], from[1], from[2], to[0], to[1], to[2]));
+            from[axis] = face + 2 * out;
+            to[axis] = face + out;
+            TEST_ASSERT_FALSE(line_hits(from[0], from[1], from[2], to[0], to[1], to[2]));
+        }
+}
+
+static void what_misses_on_any_axis_misses_wherever_it_is_on_the_others(void)
+{
+    static const int32_t where[] = {99, 100, 150, 200, 201};
+    for (unsigned x = 0; x < 5; x++)
+        for (unsigned y = 0; y < 5; y++)
+            for (unsigned z = 0; z < 5; z++) {
+                const bool in = x % 4 != 0 && y % 4 != 0 && z % 4 != 0;
+                TEST_ASSERT_EQUAL(in, line_hits(where[x], where[y], where[z], where[x], where[y], where[z]));
+                /* and as a line along one axis, past the whole cube, what counts is the other two */
+                TEST_ASSERT_EQUAL(y % 4 != 0 && z % 4 != 0, line_hits(0, where[y], where[z], 300, where[y], where[z]));
+                TEST_ASSERT_EQUAL(x % 4 != 0 && z % 4 != 0, line_hits(where[x], 0, where[z], where[x], 300, where[z]));
+                TEST_ASSERT_EQUAL(x % 4 != 0 && y % 4 != 0, line_hits(where[x], where[y], 0, where[x], where[y], 300));
+            }
+}
+
+static void a_box_is_in_another_only_if_none_of_its_faces_sticks_out(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        dr_box inner = cube;
+        inner.min_q[axis] = 99;
+        TEST_ASSERT_FALSE(dr_box_is_in(&inner, &cube));
+        inner = cube;
+        inner.max_q[axis] = 201;
+        TEST_ASSERT_FALSE(dr_box_is_in(&inner, &cube));
+        inner.max_q[axis] = inner.min_q[axis];
+        TEST_ASSERT_TRUE(dr_box_is_in(&inner, &cube));
+    }
+}
+
+static void boxes_that_are_apart_on_one_axis_do_not_touch(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        dr_box beside = cube;
+        beside.min_q[axis] = 200, beside.max_q[axis] = 300;
+        TEST_ASSERT_TRUE(dr_box_touches_box(&cube, &beside));
+        TEST_ASSERT_TRUE(dr_box_touches_box(&beside, &cube));
+        beside.min_q[axis] = 201;
+        TEST_ASSERT_FALSE(dr_box_touches_box(&cube, &beside));
+        TEST_ASSERT_FALSE(dr_box_touches_box(&beside, &cube));
+    }
 }
 
 static void boxes_touch_at_their_faces(void)
@@ -109,6 +165,38 @@ static void along_a_line_is_judged_by_the_distance_from_it(void)
     TEST_ASSERT_TRUE(dr_is_along(three, skew, 3));
 }
 
+/* Of every direction along an axis, and off it by the tolerance on one or both of the others. */
+static void the_distance_from_an_axis_is_euclidean(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        int16_t direction[DR_AXES] = {0, 0, 0};
+        direction[axis] = 1;
+        for (uint8_t off = 1; off < DR_AXES; off++) {
+            const uint8_t side = (uint8_t)((axis + off) % DR_AXES), other = (uint8_t)((axis + DR_AXES - off) % DR_AXES);
+            int32_t move[DR_AXES] = {0, 0, 0};
+            move[axis] = -30000;
+            move[side] = 5;
+            TEST_ASSERT_TRUE(dr_is_along(move, direction, 5));
+            TEST_ASSERT_FALSE(dr_is_along(move, direction, 4));
+            move[other] = 1; /* sqrt(26) */
+            TEST_ASSERT_FALSE(dr_is_along(move, direction, 5));
+            move[side] = 4, move[other] = -3;
+            TEST_ASSERT_TRUE(dr_is_along(move, direction, 5));
+            move[side] = 1, move[other] = 1;
+            TEST_ASSERT_FALSE(dr_is_along(move, direction, 1));
+        }
+    }
+}
+
+static void a_half_space_grows_by_the_corner_of_a_cube(void)
+{
+    const dr_half slope = {-200, {3, -5, 0}};
+    const dr_half grown = dr_half_grown(&slope, 7), shrunk = dr_half_grown(&slope, -7);
+    TEST_ASSERT_EQUAL_INT64(-200 + 7 * 8, grown.offset_q);
+    TEST_ASSERT_EQUAL_INT64(-200 - 7 * 8, shrunk.offset_q);
+    TEST_ASSERT_EQUAL_INT16_ARRAY(slope.normal, grown.normal, DR_AXES);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -116,8 +204,14 @@ int main(void)
     RUN_TEST(a_line_that_ends_on_a_face_touches);
     RUN_TEST(a_slanting_line_grazes_an_edge_or_a_corner);
     RUN_TEST(a_point_is_a_line_too);
+    RUN_TEST(a_step_of_one_quantum_is_a_line_too);
+    RUN_TEST(what_misses_on_any_axis_misses_wherever_it_is_on_the_others);
+    RUN_TEST(a_box_is_in_another_only_if_none_of_its_faces_sticks_out);
+    RUN_TEST(boxes_that_are_apart_on_one_axis_do_not_touch);
     RUN_TEST(boxes_touch_at_their_faces);
     RUN_TEST(a_half_space_holds_its_plane);
     RUN_TEST(along_a_line_is_judged_by_the_distance_from_it);
+    RUN_TEST(the_distance_from_an_axis_is_euclidean);
+    RUN_TEST(a_half_space_grows_by_the_corner_of_a_cube);
     return UNITY_END();
 }
