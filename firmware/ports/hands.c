@@ -41,15 +41,15 @@ static void press(dr_us now, uint8_t input, bool down)
 static bool look(dr_us now)
 {
     const uint16_t inputs = dr_port_inputs();
-    const uint16_t changed = dr_contacts_look(&buttons, inputs) & BUTTONS;
-    const uint16_t turned = (inputs ^ seen) & KNOBS;
+    const unsigned changed = dr_contacts_look(&buttons, inputs) & BUTTONS;
+    const unsigned turned = (unsigned)(inputs ^ seen) & KNOBS;
     bool is_used = changed != 0;
     seen = inputs;
     for (uint8_t input = 0; changed != 0 && input < DR_INPUT_KNOB_X; input++)
         if ((changed >> input & 1u) != 0)
-            press(now, input, (buttons.closed >> input & 1u) != 0);
+            press(now, input, ((unsigned)buttons.closed >> input & 1u) != 0);
     for (uint8_t i = 0; turned != 0 && i < KNOB_COUNT; i++) {
-        const unsigned pair = (unsigned)inputs >> (DR_INPUT_KNOB_X + 2u * i);
+        const unsigned pair = (unsigned)inputs >> ((unsigned)DR_INPUT_KNOB_X + 2u * i);
         const int8_t detents = dr_encoder_look(&knobs[i], (pair & 1u) != 0, (pair & 2u) != 0);
         if (detents == 0)
             continue;

@@ -69,7 +69,7 @@ bool dr_port_has_pace(void);
  * board has none. A board that sleeps is woken to look at them. */
 uint16_t dr_port_inputs(void);
 
-/* Makes each output high whose bit is set, the others low, as all are after dr_port_begin(). */
+/* Makes each output high whose bit is set, the others low. Until the first call none is driven. */
 void dr_port_outputs(uint8_t high);
 
 /* -- Memory that survives power-off -------------------------------------------------------------------------------- */

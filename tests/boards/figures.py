@@ -14,16 +14,33 @@ from pathlib import Path
 
 COMMITTED = Path(__file__).with_name("figures.txt")
 MARGIN = 1.03
-IMAGES = [("avr-uno", "uno", "atmega328p"), ("avr-mega", "mega", "atmega2560"), ("avr-leonardo", "leonardo", "atmega32u4"),
-          ("cortex-m", "cortex-m", None), ("cortex-m0plus", "cortex-m", None)]
 KINDS = ("trio", "mpc")
-# Everything that nests deeply: calibration, a move, a stream, a stop, a calibration of an MPC-200, memory.
+WITH_HANDS = ("trio", "mpc", "trio-hands", "mpc-hands")
+IMAGES = [("avr-uno", "uno", "atmega328p", WITH_HANDS), ("avr-mega", "mega", "atmega2560", WITH_HANDS),
+          ("avr-leonardo", "leonardo", "atmega32u4", KINDS), ("cortex-m", "cortex-m", None, KINDS),
+          ("cortex-m0plus", "cortex-m", None, KINDS)]
+# Everything that nests deeply: calibration, a move, a stream, a stop, a calibration of an MPC-200, memory. By hand: a home,
+# a pause of it or a stop, a detent of knob X, one along the diagonal.
 SCENARIO = {
     "trio": "2500000 63\n2600000 48 00 00 00 00 00 00 00 00 00 00 00 00\n3300000 52\n3400000 63 63\n4300000 77\n"
             "4400000 53 00 ff ff 03 00 ff ff 03 00 ff ff 03 00\n4600000 63\n4700000 03\n7000000 stop\n",
     "mpc": "2500000 55\n2510000 4f\n2520000 53\n2560000 0f\n2600000 80 3e 00 00 40 1f 00 00 10 00 00 00\n2700000 43 43 03\n"
            "2800000 4d 00 10 00 00 00 20 00 00 00 30 00 00\n4800000 48\n5900000 4e\n8500000 stop\n",
+    "trio-hands": "2500000 63\n2600000 low HOME\n2650000 open HOME\n2700000 low HOME\n2750000 open HOME\n"
+                  "2900000 low HOME\n2950000 open HOME\n3600000 low THIRD\n3700000 open THIRD\n3800000 low A\n"
+                  "3810000 low B\n3820000 open A\n3830000 open B\n4500000 53 00 ff ff 03 00 ff ff 03 00 ff ff 03 00\n"
+                  "4700000 03\n6500000 stop\n",
+    "mpc-hands": "2500000 4f\n2520000 53\n2560000 0f\n2600000 80 3e 00 00 40 1f 00 00 10 00 00 00\n2700000 low THIRD\n"
+                 "2750000 open THIRD\n2800000 low FOURTH\n2850000 open FOURTH\n2900000 low A\n2910000 low B\n2920000 open A\n"
+                 "2930000 open B\n3000000 low HOME\n3050000 open HOME\n4500000 low FIFTH\n4550000 open FIFTH\n7500000 stop\n",
 }
+# Buttons 1, 3, 4, 5 and the contacts of knob Z by the pins of the chip: tests/boards/test_avr_hands.py.
+PINS = {"uno": {"HOME": "D6", "THIRD": "B0", "FOURTH": "B1", "FIFTH": "B2", "A": "C4", "B": "C5"},
+        "mega": {"HOME": "H3", "THIRD": "H5", "FOURTH": "H6", "FIFTH": "B4", "A": "F4", "B": "F5"}}
+
+
+def scenario(kind, board):
+    return re.sub("(low|open) (\\w+)", lambda found: f"{found[1]} {PINS[board][found[2]]}", SCENARIO[kind])
 
 
 def run(*command, text=None):
@@ -85,15 +102,15 @@ def deepest_chain(tool, elf, build, root, return_bytes):
 
 def measure(arguments):
     rows = {}
-    for build, board, mcu in IMAGES:
+    for build, board, mcu, kinds in IMAGES:
         directory = Path(arguments.builds, build)
         tool = "avr" if mcu else "arm-none-eabi"
-        for kind in KINDS:
+        for kind in kinds:
             elf = directory / f"{board}-{kind}.elf"
             rows[f"{build}-{kind} flash"], rows[f"{build}-{kind} static-RAM"] = sections(tool, elf)
             if mcu:
                 said = run(arguments.avr_board, *(["--usb"] if board == "leonardo" else []), "--script", "-", mcu, elf,
-                           text=SCENARIO[kind])
+                           text=scenario(kind, board))
                 rows[f"{build}-{kind} stack-seen"] = int(re.search(r"stack (\d+) bytes", said).group(1))
         if build in ("avr-uno", "cortex-m0plus"):
             parts = modules(directory / f"{board}-mpc.map")
