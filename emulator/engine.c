@@ -53,12 +53,19 @@ static bool station_due(const engine *e, uint64_t *when_us, station **whose)
 {
     bool have = false;
     uint64_t when;
-    for (unsigned i = 0; i < e->station_count; i++)
-        if (instrument_due(&e->stations[i].ins, &when) && (!have || when < *when_us)) {
+    for (unsigned i = 0; i < e->station_count; i++) {
+        station *const s = &e->stations[i];
+        bool is_due = instrument_due(&s->ins, &when);
+        if (s->plug_at_us > 0 && (!is_due || s->plug_at_us < when)) {
+            is_due = true;
+            when = s->plug_at_us;
+        }
+        if (is_due && (!have || when < *when_us)) {
             have = true;
             *when_us = when;
-            *whose = &e->stations[i];
+            *whose = s;
         }
+    }
     return have;
 }
 
@@ -82,6 +89,31 @@ static bool due(const engine *e, bool is_passive_too, uint64_t *when_us)
 
 bool engine_due(const engine *e, uint64_t *when_us) { return due(e, false, when_us); }
 
+/* The plug goes in again by itself. */
+static void plug_again(engine *e, station *s)
+{
+    char why[512];
+    s->plug_at_us = 0;
+    if (engine_plug_station(e, s, why, sizeof why))
+        return;
+    (void)fprintf(stderr, "dryrig-emu: the USB plug of %s stays out: %s\n", s->name, why);
+    station_say(s, OBSERVED_EVENT, "the USB plug cannot be put in");
+}
+
+/* Brings a station to an instant, and its plug with it. */
+static void run_station(engine *e, station *s, uint64_t until_us)
+{
+    for (bool is_there = false; !is_there;) {
+        const bool plugs = s->plug_at_us > 0 && s->plug_at_us <= until_us;
+        if (!station_run(s, plugs ? s->plug_at_us : until_us, e->now_ns))
+            engine_unplug_station(e, s, s->ins.faults.unplug_us);
+        else if (plugs)
+            plug_again(e, s);
+        else
+            is_there = true;
+    }
+}
+
 /* Brings everything to now_us, in order of time. What is planned for an instant comes after what controllers do then. */
 static void run_to_now(engine *e)
 {
@@ -93,11 +125,11 @@ static void run_to_now(engine *e)
         const bool have_plan = plan != NULL && plan->when_us <= until_us;
         if (station_due(e, &when_us, &whose) && when_us <= (have_plan ? plan->when_us : until_us)) {
             const bool is_alone = e->station_count == 1 && !have_plan; /* nobody to wait for */
-            station_run(whose, is_alone ? until_us : when_us, e->now_ns);
+            run_station(e, whose, is_alone ? until_us : when_us);
         } else if (have_plan) {
             e->now_us = plan->when_us;
             for (unsigned i = 0; i < e->station_count; i++)
-                station_run(&e->stations[i], plan->when_us, e->now_ns);
+                run_station(e, &e->stations[i], plan->when_us);
             engine_unplan(e, plan);
             plan->strike(plan);
             e->now_us = until_us;
@@ -106,7 +138,7 @@ static void run_to_now(engine *e)
         }
     }
     for (unsigned i = 0; i < e->station_count; i++)
-        station_run(&e->stations[i], until_us, e->now_ns);
+        run_station(e, &e->stations[i], until_us);
 }
 
 /* -- Ports ------------------------------------------------------------------------------------------------------------- */
@@ -162,7 +194,8 @@ static void listen_to(engine *e, station *s)
         const bool has_more = s->chunk_is_full; /* if not, the kernel will say when it has */
         read_hints(e);                          /* see station_take() */
         e->now_ns = real_ns();                  /* not before it was written: pauses never look shorter for that */
-        station_take(s, e->now_us, e->now_ns);
+        station_take(s, e->now_ns);
+        run_station(e, s, e->now_us);
         if (!has_more)
             return;
     }
@@ -185,10 +218,12 @@ static bool is_station(const engine *e, const source *who)
     return who >= e->station_sources && who < e->station_sources + e->station_count;
 }
 
-void engine_unplug_station(engine *e, station *s)
+void engine_unplug_station(engine *e, station *s, uint64_t span_us)
 {
+    s->ins.faults.unplug_us = 0;
     if (!s->is_plugged)
         return;
+    s->plug_at_us = span_us > 0 ? s->ins.now_us + span_us : 0;
     engine_forget(e, s->port.fd);
     station_say(s, OBSERVED_EVENT, "the USB plug is out");
     station_unplug(s, e->inotify);
@@ -198,6 +233,7 @@ bool engine_plug_station(engine *e, station *s, char *why, size_t room)
 {
     if (s->is_plugged)
         return true;
+    s->plug_at_us = 0;
     if (!station_plug(s, e->inotify, why, room))
         return false;
     if (!engine_watch(e, &e->station_sources[s - e->stations], s->port.fd, EPOLLIN | EPOLLET)) {
@@ -317,7 +353,8 @@ void engine_catch_up(engine *e)
     for (unsigned i = 0; i < e->station_count; i++)
         while (station_read(&e->stations[i])) { /* until a read finds nothing: it has waited for what was on its way */
             read_hints(e);
-            station_take(&e->stations[i], e->now_us, e->now_ns);
+            station_take(&e->stations[i], e->now_ns);
+            run_station(e, &e->stations[i], e->now_us);
         }
 }
 

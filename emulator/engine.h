@@ -68,8 +68,8 @@ void engine_forget(engine *e, int fd);
 void engine_plan(engine *e, planned *what);
 void engine_unplan(engine *e, planned *what);
 
-/* A station's USB plug. In again: false: why[] tells. */
-void engine_unplug_station(engine *e, station *s);
+/* A station's USB plug: out for so long (0: until it is put in), and in again: false: why[] tells. */
+void engine_unplug_station(engine *e, station *s, uint64_t span_us);
 bool engine_plug_station(engine *e, station *s, char *why, size_t room);
 
 /* Everything that has happened until now has happened when this returns: bytes that wait in the ports have been taken in. */

@@ -6,25 +6,68 @@
 #define MS UINT32_C(1000)
 
 static const fault_words words[FAULTS] = {
-    [FAULT_DROP_BYTE] = {"drop-byte", "one byte of an answer is lost", 0, FAULT_OF_ANSWER, false},
-    [FAULT_DELAY_BYTE] = {"delay-byte", "one byte of an answer, and what follows, is late", 200 * MS, FAULT_OF_ANSWER,
-                          false},
-    [FAULT_DUPLICATE_BYTE] = {"duplicate-byte", "one byte of an answer comes twice", 0, FAULT_OF_ANSWER, false},
-    [FAULT_CORRUPT_BYTE] = {"corrupt-byte", "one bit of an answer is changed", 0, FAULT_OF_ANSWER, false},
-    [FAULT_DROP_CR] = {"drop-cr", "the CR of an answer is lost", 0, FAULT_OF_ANSWER, false},
-    [FAULT_LATE_CR] = {"late-cr", "the CR of an answer is late", 500 * MS, FAULT_OF_ANSWER, false},
-    [FAULT_STRAY_BYTES] = {"stray-bytes", "two bytes that mean nothing come before an answer", 0, FAULT_OF_ANSWER,
-                           false},
-    [FAULT_SLOW_ANSWER] = {"slow-answer", "an answer is late", 500 * MS, FAULT_OF_ANSWER, false},
-    [FAULT_SHORT_FRAME] = {"short-frame", "a streamed frame lacks its last bytes", 0, FAULT_OF_FRAME, false},
-    [FAULT_TORN_FRAME] = {"torn-frame", "a streamed frame stops in its middle for a while", 50 * MS, FAULT_OF_FRAME,
-                          false},
-    [FAULT_LOSE_HOST_BYTE] = {"lose-host-byte", "a byte of the host never arrives", 0, FAULT_OF_HOST_BYTE, false},
-    [FAULT_IGNORE_STOP] = {"ignore-stop", "^C never arrives", 0, FAULT_OF_STOP, false},
-    [FAULT_WEDGE] = {"wedge", "deaf and mute from a command on, until a power cycle", 0, FAULT_OF_COMMAND, false},
-    [FAULT_STALL_AXIS] = {"stall-axis", "an axis gets half of its way only; the answer is as ever", 0, FAULT_OF_LEG,
-                          true},
-    [FAULT_SLIP_AXIS] = {"slip-axis", "the position of an axis counts, its tip stays", 0, FAULT_OF_LEG, true}};
+    [FAULT_DROP_BYTE] = {.name = "drop-byte", .meaning = "one byte of an answer is lost", .strikes = FAULT_OF_ANSWER},
+    [FAULT_DELAY_BYTE] = {.name = "delay-byte",
+                          .meaning = "one byte of an answer, and what follows, is late",
+                          .delay_us = 200 * MS,
+                          .strikes = FAULT_OF_ANSWER},
+    [FAULT_DUPLICATE_BYTE] = {.name = "duplicate-byte",
+                              .meaning = "one byte of an answer comes twice",
+                              .strikes = FAULT_OF_ANSWER},
+    [FAULT_CORRUPT_BYTE] = {.name = "corrupt-byte",
+                            .meaning = "one bit of an answer is changed",
+                            .strikes = FAULT_OF_ANSWER},
+    [FAULT_DROP_CR] = {.name = "drop-cr", .meaning = "the CR of an answer is lost", .strikes = FAULT_OF_ANSWER},
+    [FAULT_LATE_CR] = {.name = "late-cr",
+                       .meaning = "the CR of an answer is late",
+                       .delay_us = 500 * MS,
+                       .strikes = FAULT_OF_ANSWER},
+    [FAULT_STRAY_BYTES] = {.name = "stray-bytes",
+                           .meaning = "two bytes that mean nothing come before an answer",
+                           .strikes = FAULT_OF_ANSWER},
+    [FAULT_SLOW_ANSWER] = {.name = "slow-answer",
+                           .meaning = "an answer is late",
+                           .delay_us = 500 * MS,
+                           .strikes = FAULT_OF_ANSWER},
+    [FAULT_SHORT_FRAME] = {.name = "short-frame",
+                           .meaning = "a streamed frame lacks its last bytes",
+                           .strikes = FAULT_OF_FRAME},
+    [FAULT_TORN_FRAME] = {.name = "torn-frame",
+                          .meaning = "a streamed frame stops in its middle for a while",
+                          .delay_us = 50 * MS,
+                          .strikes = FAULT_OF_FRAME},
+    [FAULT_LOSE_HOST_BYTE] = {.name = "lose-host-byte",
+                              .meaning = "a byte of the host never arrives",
+                              .strikes = FAULT_OF_HOST_BYTE},
+    [FAULT_IGNORE_STOP] = {.name = "ignore-stop", .meaning = "^C never arrives", .strikes = FAULT_OF_STOP},
+    [FAULT_WEDGE] = {.name = "wedge",
+                     .meaning = "deaf and mute from a command on, until a power cycle",
+                     .strikes = FAULT_OF_COMMAND},
+    [FAULT_STALL_AXIS] = {.name = "stall-axis",
+                          .meaning = "an axis gets half of its way only; the answer is as ever",
+                          .strikes = FAULT_OF_LEG,
+                          .takes_axis = true},
+    [FAULT_SLIP_AXIS] = {.name = "slip-axis",
+                         .meaning = "the position of an axis counts, its tip stays",
+                         .strikes = FAULT_OF_LEG,
+                         .takes_axis = true},
+    [FAULT_SLOW_MOTION] = {.name = "slow-motion",
+                           .meaning = "a move lasts several times as long",
+                           .strikes = FAULT_OF_MOVE,
+                           .times = 3},
+    [FAULT_POWER_LOSS] = {.name = "power-loss",
+                          .meaning = "the power goes half way through a leg of a move, for a while",
+                          .delay_us = 1000 * MS,
+                          .strikes = FAULT_OF_LEG},
+    [FAULT_POWER_LOSS_FORGET] = {.name = "power-loss-forget",
+                                 .meaning =
+                                     "the power goes half way through a leg of a move, and the positions with it",
+                                 .delay_us = 1000 * MS,
+                                 .strikes = FAULT_OF_LEG},
+    [FAULT_USB_UNPLUG] = {.name = "usb-unplug",
+                          .meaning = "the cable to the host comes out when a command has arrived, for a while",
+                          .delay_us = 2000 * MS,
+                          .strikes = FAULT_OF_COMMAND}};
 
 const fault_words *faults_words(fault_id id) { return &words[id]; }
 
@@ -65,6 +108,10 @@ void faults_remove(faults *f, fault_id id)
     for (uint8_t i = f->count; i-- > 0;)
         if (id == FAULTS || f->rules[i].id == id)
             remove_at(f, i);
+    if (id == FAULTS || id == FAULT_SLOW_MOTION)
+        f->slow_times = 0;
+    if (id == FAULTS || id == FAULT_POWER_LOSS || id == FAULT_POWER_LOSS_FORGET)
+        f->power_off_us = 0;
 }
 
 /* A number from 0 to most - 1 (xorshift64*). */
@@ -181,69 +228,131 @@ uint8_t faults_byte(faults *f, uint8_t byte, uint8_t out[FAULT_BYTES_MAX])
 
 /* -- The host's bytes ----------------------------------------------------------------------------------------------------- */
 
+/* Is this byte the last one of a command? */
+static bool completes(const dr_controller *c, uint8_t byte, dr_command *command)
+{
+    const uint8_t code = c->framer.have > 0 ? c->framer.bytes[0] : byte;
+    return dr_command_find((dr_kind)c->kind, c->firmware, code, command) && c->framer.have == command->args;
+}
+
 bool faults_host_byte(faults *f, uint64_t now_us, const dr_controller *c, uint8_t byte)
 {
     dr_command command;
     fault_rule r;
     if (f->is_wedged || strikes(f, FAULT_LOSE_HOST_BYTE, now_us, DR_OP_NONE, &r))
         return false;
-    if (c->framer.have > 0 || !dr_command_find((dr_kind)c->kind, c->firmware, byte, &command))
-        return true;
-    if ((command.is & DR_IS_INTERRUPT) != 0 && strikes(f, FAULT_IGNORE_STOP, now_us, command.op, &r))
-        return false;
-    f->is_wedged = strikes(f, FAULT_WEDGE, now_us, command.op, &r);
+    if (c->framer.have == 0 && dr_command_find((dr_kind)c->kind, c->firmware, byte, &command)) {
+        if ((command.is & DR_IS_INTERRUPT) != 0 && strikes(f, FAULT_IGNORE_STOP, now_us, command.op, &r))
+            return false;
+        f->is_wedged = strikes(f, FAULT_WEDGE, now_us, command.op, &r);
+    }
+    if (completes(c, byte, &command) && !f->is_wedged && strikes(f, FAULT_USB_UNPLUG, now_us, command.op, &r))
+        f->unplug_us = r.delay_us > 0 ? r.delay_us : 1u;
     return !f->is_wedged;
 }
 
-/* -- Axes ----------------------------------------------------------------------------------------------------------------- */
+/* -- Moves --------------------------------------------------------------------------------------------------------------- */
 
 static bool is_moving(const dr_controller *c) { return c->state == DR_STATE_MOVING || c->state == DR_STATE_PAUSED; }
+
+static bool calibrates(uint8_t op) { return op == DR_OP_MPC_CALIBRATE || op == DR_OP_TRIO_RECALIBRATE; }
 
 static void end_slip(faults *f, const dr_controller *c)
 {
     if (!f->slips)
         return;
     f->slips = false;
+    f->has_slipped = true;
     f->slipped_steps[f->slip_drive][f->slip_axis] +=
         (int64_t)c->drives[f->slip_drive].position_steps[f->slip_axis] - (int64_t)f->slip_from_steps;
 }
 
-/* The leg has just begun, nothing of it is done: its end comes half way, and so much earlier. The core evaluates the leg as
- * it stands, so positions, streamed frames and ^C are right. */
-static void stall(dr_leg *leg, uint8_t axis)
+/* A whole calibration finds the ends of the axes: positions are those of the tips again. */
+static void end_move(faults *f, const dr_controller *c)
 {
-    const uint32_t from = leg->from[axis], to = leg->to[axis];
-    leg->to[axis] = to > from ? from + (to - from) / 2u : from - (from - to) / 2u;
-    leg->lasts_us[axis] = leg->to[axis] == from ? 0 : (leg->lasts_us[axis] + 1u) / 2u;
+    f->slow_times = 0;
+    if (calibrates(f->move_op) && c->drives[f->move_drive].calibration == DR_CALIBRATED)
+        memset(f->slipped_steps[f->move_drive], 0, sizeof f->slipped_steps[f->move_drive]);
+}
+
+/* As much longer as the clock of a leg can tell. */
+static uint16_t times_that_fit(const dr_controller *c, uint8_t times)
+{
+    const uint32_t lasts_us = dr_leg_lasts_us(&c->leg);
+    const uint32_t most = lasts_us == 0 ? 1u : (uint32_t)INT32_MAX / lasts_us;
+    return times == 0 ? 1u : times < most ? times : (uint16_t)most;
+}
+
+static void lose_power(faults *f, uint64_t now_us, const dr_controller *c, fault_id id)
+{
+    fault_rule r;
+    if (!strikes(f, id, now_us, c->move_op, &r))
+        return;
+    f->power_off_us = now_us + dr_leg_lasts_us(&c->leg) / 2u;
+    f->without_power_us = r.delay_us;
+    f->power_forgets = id == FAULT_POWER_LOSS_FORGET;
 }
 
 static void begin_leg(faults *f, uint64_t now_us, dr_controller *c)
 {
     fault_rule r;
-    if (strikes(f, FAULT_STALL_AXIS, now_us, c->move_op, &r))
-        stall(&c->leg, r.axis);
+    const uint8_t stalled = strikes(f, FAULT_STALL_AXIS, now_us, c->move_op, &r) ? r.axis : DR_AXES;
+    if (stalled < DR_AXES || f->slow_times > 0)
+        (void)dr_controller_spoil_leg(c, (dr_us)now_us, stalled, times_that_fit(c, f->slow_times));
     if (strikes(f, FAULT_SLIP_AXIS, now_us, c->move_op, &r)) {
         f->slips = true;
         f->slip_axis = r.axis;
         f->slip_drive = c->active;
-        f->slip_from_steps = c->leg.from[r.axis];
+        f->slip_from_steps = c->drives[c->active].position_steps[r.axis]; /* where the leg begins */
     }
+    lose_power(f, now_us, c, FAULT_POWER_LOSS);
+    lose_power(f, now_us, c, FAULT_POWER_LOSS_FORGET);
 }
 
 void faults_look(faults *f, uint64_t now_us, dr_controller *c)
 {
+    fault_rule r;
     const bool moves = is_moving(c);
-    const bool is_new = c->state == DR_STATE_MOVING && c->leg_began == (dr_us)now_us &&
-                        (f->leg_state == DR_STATE_REST || f->leg_number != c->move_leg || f->leg_began != c->leg_began);
+    const bool is_leg = c->state == DR_STATE_MOVING && c->leg_began == (dr_us)now_us &&
+                        (!f->was_moving || f->leg_number != c->move_leg || f->leg_began != c->leg_began);
+    const bool is_move = is_leg && (!f->was_moving || c->move_leg <= f->leg_number || c->move_op != f->move_op);
     if (c->state == DR_STATE_OFF)
         f->is_wedged = f->is_answering = false;
-    if (is_new || !moves)
+    else
+        f->power_on_us = 0; /* it is back, or somebody was faster */
+    if (is_leg || !moves)
         end_slip(f, c);
-    if (is_new)
+    if (f->was_moving && (is_move || !moves))
+        end_move(f, c);
+    if (is_move)
+        f->slow_times = strikes(f, FAULT_SLOW_MOTION, now_us, c->move_op, &r) ? r.times : 0;
+    if (is_leg)
         begin_leg(f, now_us, c);
-    f->leg_state = moves ? DR_STATE_MOVING : DR_STATE_REST;
+    f->was_moving = moves;
+    f->move_op = c->move_op;
+    f->move_drive = c->active;
     f->leg_number = c->move_leg;
     f->leg_began = c->leg_began;
+}
+
+bool faults_power_due(const faults *f, uint64_t *when_us, bool *on)
+{
+    *on = f->power_off_us == 0;
+    *when_us = *on ? f->power_on_us : f->power_off_us;
+    return *when_us > 0;
+}
+
+void faults_forget_positions(faults *f, dr_controller *c)
+{
+    for (uint8_t i = 0; i < c->drive_count; i++) {
+        dr_drive *const drive = &c->drives[i];
+        for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+            f->slipped_steps[i][axis] -= drive->position_steps[axis];
+            drive->position_steps[axis] = 0;
+        }
+        drive->calibration = DR_UNCALIBRATED;
+    }
+    f->has_slipped = true;
 }
 
 int64_t faults_slipped_steps(const faults *f, const dr_controller *c, uint8_t drive, uint8_t axis, dr_us now)

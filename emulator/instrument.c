@@ -194,9 +194,33 @@ static bool hands_or_controller_due(const instrument *ins, uint64_t *when_us)
     return have;
 }
 
+/* The mains switch, as faults work it. */
+static bool power_due(const instrument *ins, uint64_t *when_us, bool *on)
+{
+    if (!faults_power_due(&ins->faults, when_us, on))
+        return false;
+    if (*when_us < ins->now_us)
+        *when_us = ins->now_us;
+    return true;
+}
+
+static void switch_power(instrument *ins, bool on)
+{
+    faults *f = &ins->faults;
+    const bool was_on = ins->controller.state != DR_STATE_OFF;
+    f->power_off_us = f->power_on_us = 0;
+    dr_panel_power(&ins->panel, instrument_now(ins), on);
+    if (on || !was_on)
+        return;
+    f->power_on_us = ins->now_us + f->without_power_us;
+    if (f->power_forgets)
+        faults_forget_positions(f, &ins->controller);
+}
+
 bool instrument_due(const instrument *ins, uint64_t *when_us)
 {
     bool have = hands_or_controller_due(ins, when_us);
+    bool on;
     uint64_t when;
     if (ins->sending != INSTRUMENT_NOTHING)
         have = earlier(have, through_us(ins, &ins->to_host, ins->to_host.bytes + 1u), when_us);
@@ -208,6 +232,8 @@ bool instrument_due(const instrument *ins, uint64_t *when_us)
         have = earlier(have, when, when_us);
     if (arrival_due(ins, &when))
         have = earlier(have, when, when_us);
+    if (power_due(ins, &when, &on))
+        have = earlier(have, when, when_us);
     return have;
 }
 
@@ -216,9 +242,12 @@ bool instrument_due(const instrument *ins, uint64_t *when_us)
 static size_t step(instrument *ins, uint8_t *bytes, size_t room)
 {
     size_t count = 0;
+    bool on;
     uint64_t when;
     if (hands_or_controller_due(ins, &when) && when == ins->now_us)
         dr_panel_settle(&ins->panel, instrument_now(ins));
+    else if (power_due(ins, &when, &on) && when == ins->now_us)
+        switch_power(ins, on);
     else if (ins->sending != INSTRUMENT_NOTHING &&
              through_us(ins, &ins->to_host, ins->to_host.bytes + 1u) == ins->now_us)
         count = finish_byte(ins, bytes, room);
@@ -241,6 +270,8 @@ bool instrument_run(instrument *ins, uint64_t until_us, uint8_t *bytes, size_t r
 {
     uint64_t when;
     *count = 0;
+    if (faults_any(&ins->faults)) /* hands may have begun a leg */
+        faults_look(&ins->faults, ins->now_us, &ins->controller);
     while (instrument_due(ins, &when) && when <= until_us) {
         ins->now_us = when;
         *count = step(ins, bytes, room);

@@ -50,7 +50,7 @@ typedef struct {
      * controller answers. */
     dr_panel panel;
 
-    /* What goes wrong. Set up with faults_init(); its `struck` is for the caller to look at, and to clear. */
+    /* What goes wrong. Set up with faults_init(); `struck` and `unplug_us` are for the caller to look at, and to clear. */
     faults faults;
 
     /* to be read by anybody, written by instrument only */

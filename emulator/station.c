@@ -152,7 +152,7 @@ static void send_to_host(station *s, const uint8_t *bytes, size_t count)
     }
 }
 
-void station_run(station *s, uint64_t now_us, uint64_t now_ns)
+bool station_run(station *s, uint64_t now_us, uint64_t now_ns)
 {
     uint8_t bytes[CHUNK];
     size_t count;
@@ -164,6 +164,8 @@ void station_run(station *s, uint64_t now_us, uint64_t now_ns)
             tell_faults(s);
         if (count > 0)
             send_to_host(s, bytes, count);
+        if (s->ins.faults.unplug_us > 0)
+            return false;
     }
     if (s->ins.controller.state == DR_STATE_WEDGED && !s->told_wedge) {
         s->told_wedge = true;
@@ -172,6 +174,7 @@ void station_run(station *s, uint64_t now_us, uint64_t now_ns)
                       "cycle' on the control channel)\n",
                       s->name);
     }
+    return true;
 }
 
 static bool is_same_tty(const struct termios *a, const struct termios *b)
@@ -208,7 +211,7 @@ bool station_read(station *s)
     return s->chunk_count > 0;
 }
 
-void station_take(station *s, uint64_t now_us, uint64_t now_ns)
+void station_take(station *s, uint64_t now_ns)
 {
     const uint64_t pause_us = (now_ns - s->read_ns) / NS_PER_US;
     const uint32_t pause = pause_us < UINT32_MAX ? (uint32_t)pause_us : UINT32_MAX;
@@ -227,7 +230,6 @@ void station_take(station *s, uint64_t now_us, uint64_t now_ns)
         observe(s->observers, &seen);
     }
     (void)instrument_take(&s->ins, pause, s->chunk, s->chunk_count);
-    station_run(s, now_us, now_ns);
 }
 
 /* First what is to be done, then telling: who is told acts on it. */

@@ -25,6 +25,7 @@ struct station {
     pty port;
     uint8_t unplugged[DR_PORTS]; /* dr_stage_id: what hands have last taken from each port */
     bool is_plugged;             /* it has a port; false while its USB plug is out */
+    uint64_t plug_at_us;         /* it is put in again then, by whoever runs the station; 0: not by itself */
     int link_lock;               /* -1: no link */
     bool was_open;               /* see station_look() */
     bool has_unread;             /* the kernel holds bytes that the line had no room for */
@@ -52,13 +53,14 @@ void station_unplug(station *s, int inotify_fd);
 /* Switches the instrument on, at now_us of the controller's clock. */
 void station_start(station *s, uint64_t now_us, uint64_t now_ns);
 
-/* Brings the instrument to now_us and hands what leaves to the port. */
-void station_run(station *s, uint64_t now_us, uint64_t now_ns);
+/* Brings the instrument to now_us and hands what leaves to the port. False: a fault takes the plug out at ins.now_us, for
+ * ins.faults.unplug_us; when that is done, go on. */
+bool station_run(station *s, uint64_t now_us, uint64_t now_ns);
 /* Reads what the host has sent, as far as the line has room. False: nothing now. */
 bool station_read(station *s);
-/* Takes it, at now_us. Between the two comes station_look(): who has opened or closed the port has done so before the bytes
+/* Takes it; station_run() comes next. Between the two comes station_look(): who has opened or closed the port has done so before the bytes
  * that are there now, and what is on its way to a host that has gone must not meet the answer to the next. */
-void station_take(station *s, uint64_t now_us, uint64_t now_ns);
+void station_take(station *s, uint64_t now_ns);
 /* Somebody may have opened or closed the port: pty_hint() has been called, was_open says how it was before. */
 void station_look(station *s);
 /* Gives the kernel what the host is to read. True: all of it. */

@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define TIMES_MAX 100u
+
 static faults *faults_of(const telling *t) { return &t->s->ins.faults; }
 
 static bool wrong_name(telling *t, const char *name)
@@ -45,6 +47,42 @@ static bool read_axis(telling *t, uint8_t *axis)
     return telling_wrong(t, "'%s': expected an axis: x, y or z", t->words[t->at] == NULL ? "" : t->words[t->at]);
 }
 
+/* How many times as long. */
+static bool read_times(telling *t, uint8_t *times)
+{
+    char why[WHY_ROOM];
+    unsigned value;
+    if (!values_number(telling_next(t), 2, TIMES_MAX, &value, why))
+        return telling_wrong(t, "'%s': %s", t->words[t->at - 1], why);
+    *times = (uint8_t)value;
+    return true;
+}
+
+/* Can the fault strike this command at all? */
+static bool can_strike(telling *t, const fault_words *words, dr_op op)
+{
+    dr_command command;
+    const char *const word = t->words[t->at - 1];
+    const dr_controller *const c = &t->s->ins.controller;
+    if (!dr_command_for((dr_kind)c->kind, c->firmware, op, &command))
+        return true;
+    switch ((fault_chance)words->strikes) {
+    case FAULT_OF_HOST_BYTE:
+        return telling_wrong(t, "'%s': a byte that is lost belongs to no command yet: say 'on S fault ...'", word);
+    case FAULT_OF_STOP:
+        return (command.is & DR_IS_INTERRUPT) != 0 || telling_wrong(t, "'%s': it is about ^C alone", word);
+    case FAULT_OF_FRAME:
+        return op == DR_OP_MPC_LINE || telling_wrong(t, "'%s': positions are streamed by S of an MPC-200 alone", word);
+    case FAULT_OF_LEG:
+    case FAULT_OF_MOVE:
+        return (command.is & DR_IS_MOTION) != 0 || telling_wrong(t, "'%s': expected a command that moves", word);
+    case FAULT_OF_ANSWER:
+    case FAULT_OF_COMMAND:
+        break;
+    }
+    return true;
+}
+
 /* When and how often. What is said by chance, or of a span of time, holds always, else once, where nothing is said. */
 static bool read_when(telling *t, fault_rule *r)
 {
@@ -61,9 +99,7 @@ static bool read_when(telling *t, fault_rule *r)
             has_count = done = true;
             r->left = FAULT_ALWAYS;
         } else if (telling_take(t, "on")) {
-            if (r->id == FAULT_LOSE_HOST_BYTE)
-                return telling_wrong(t, "a byte that is lost belongs to no command yet: say 'on S fault ...'");
-            done = telling_command(t, &op);
+            done = telling_command(t, &op) && can_strike(t, faults_words((fault_id)r->id), op);
             r->op = done ? (uint8_t)op : r->op;
         } else if (telling_take(t, "chance")) {
             has_limits = true;
@@ -107,13 +143,18 @@ static bool do_fault(telling *t)
     const fault_words *const words = faults_words(id);
     r.id = (uint8_t)id;
     r.delay_us = words->delay_us;
+    r.times = words->times;
     if (words->takes_axis && !read_axis(t, &r.axis))
         return false;
     const char *const word = t->words[t->at];
-    if (words->delay_us > 0 && word != NULL && strspn(word, "0123456789") > 0 && !telling_time(t, &r.delay_us))
+    const bool has_number = word != NULL && strspn(word, "0123456789") > 0;
+    if (words->delay_us > 0 && has_number && !telling_time(t, &r.delay_us))
         return false;
-    if (!read_when(t, &r))
+    if (words->times > 0 && has_number && !read_times(t, &r.times))
         return false;
+    if (!read_when(t, &r) || !telling_ends(t))
+        return false;
+    faults_look(faults_of(t), t->s->ins.now_us, &t->s->ins.controller); /* the leg that has begun is spared */
     return faults_add(faults_of(t), &r) ||
            telling_wrong(t, "%u rules are all that there is room for; 'fault off' forgets them", FAULT_RULES);
 }
@@ -134,6 +175,8 @@ static cJSON *rule_json(const fault_rule *r)
         (void)cJSON_AddNumberToObject(out, "until_us", (double)r->until_us);
     if (r->delay_us > 0)
         (void)cJSON_AddNumberToObject(out, "delay_us", (double)r->delay_us);
+    if (r->times > 0)
+        (void)cJSON_AddNumberToObject(out, "times", r->times);
     return out;
 }
 
@@ -150,6 +193,8 @@ static bool do_faults(telling *t)
         (void)cJSON_AddStringToObject(entry, "does", words->meaning);
         if (words->delay_us > 0)
             (void)cJSON_AddNumberToObject(entry, "delay_us", words->delay_us);
+        if (words->times > 0)
+            (void)cJSON_AddNumberToObject(entry, "times", words->times);
         (void)cJSON_AddBoolToObject(entry, "takes_axis", words->takes_axis);
         (void)cJSON_AddItemToArray(list, entry);
     }
@@ -157,7 +202,7 @@ static bool do_faults(telling *t)
 }
 
 const verb verbs_fault[] = {
-    {"fault", "NAME [AXIS|DELAY] [next [N]|always] [on S] [chance P] [from TIME] [until TIME] | [NAME] off",
+    {"fault", "NAME [AXIS|TIME|TIMES] [next [N]|always] [on S] [chance P] [from TIME] [until TIME] | [NAME] off",
      "something goes wrong: once, where nothing else is said", true, do_fault},
     {"faults", "", "list what can go wrong, and what is about to", false, do_faults},
     {NULL, NULL, NULL, false, NULL}};

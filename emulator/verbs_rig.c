@@ -206,18 +206,26 @@ static bool power(telling *t, bool on)
 static bool do_power(telling *t)
 {
     uint64_t span_us = 0;
-    if (telling_take(t, "off"))
-        return telling_ends(t) && power(t, false);
-    if (telling_take(t, "on"))
+    const bool off = telling_take(t, "off");
+    if (!off && telling_take(t, "on"))
         return telling_ends(t) && power(t, true);
-    if (!telling_take(t, "cycle"))
+    if (!off && !telling_take(t, "cycle"))
         return telling_wrong(t, "expected off, on or cycle");
-    if (t->words[t->at] != NULL && !telling_time(t, &span_us))
+    bool forgets = telling_take(t, "forget");
+    if (!off && !forgets && t->words[t->at] != NULL) {
+        if (!telling_time(t, &span_us))
+            return false;
+        forgets = telling_take(t, "forget");
+    }
+    if (!telling_ends(t) || !power(t, false))
         return false;
+    if (forgets)
+        faults_forget_positions(&t->s->ins.faults, controller(t));
+    if (off)
+        return true;
     char line[LANGUAGE_LINE];
     (void)snprintf(line, sizeof line, "@%s power on", t->s->name);
-    return telling_ends(t) && power(t, false) &&
-           (span_us > 0 ? telling_later(t, t->s->ins.now_us + span_us, line, false) : power(t, true));
+    return span_us > 0 ? telling_later(t, t->s->ins.now_us + span_us, line, false) : power(t, true);
 }
 
 static bool do_device(telling *t)
@@ -266,11 +274,7 @@ static bool do_usb(telling *t)
         return false;
     if (!telling_ends(t))
         return false;
-    char line[LANGUAGE_LINE];
-    (void)snprintf(line, sizeof line, "@%s usb plug", t->s->name);
-    if (span_us > 0 && !telling_later(t, t->s->ins.now_us + span_us, line, false))
-        return false;
-    engine_unplug_station(t->l->e, t->s);
+    engine_unplug_station(t->l->e, t->s, span_us);
     return true;
 }
 
@@ -411,8 +415,8 @@ const verb verbs_rig[] = {
     {"state", "", "tell everything: the clock, and each controller with its devices", false, do_state},
     {"advance", "TIME | until idle [TIME]",
      "move the clock of --clock step or jump; 'until idle': an hour at most, or TIME", false, do_advance},
-    {"power", "off | on | cycle [TIME]", "the mains switch; cycle: off, and on again at once or after TIME", true,
-     do_power},
+    {"power", "off [forget] | on | cycle [TIME] [forget]",
+     "the mains switch; cycle: off, and on again at once or after TIME; forget: positions are lost", true, do_power},
     {"device", "N unplug | plug [MODEL]", "the device at port N", true, do_device},
     {"usb", "unplug [TIME] | plug", "the host's cable: its port hangs up and its link is gone; back after TIME", true,
      do_usb},

@@ -1019,6 +1019,25 @@ bool dr_controller_apply(dr_controller *c, dr_us now, dr_effect effect, uint8_t 
     return true;
 }
 
+/* -- Rehearsing faults of the mechanics ------------------------------------------------------------------------------ */
+
+bool dr_controller_spoil_leg(dr_controller *c, dr_us now, uint8_t axis, uint16_t times)
+{
+    dr_leg *leg = &c->leg;
+    if (c->state != DR_STATE_MOVING || c->leg_began != now || times == 0 ||
+        dr_leg_lasts_us(leg) > (uint32_t)INT32_MAX / times)
+        return false;
+    for (uint8_t i = 0; i < DR_AXES; i++)
+        leg->lasts_us[i] *= times;
+    if (axis < DR_AXES) {
+        const uint32_t from = leg->from[axis], to = leg->to[axis];
+        leg->to[axis] = to > from ? from + (to - from) / 2u : from - (from - to) / 2u;
+        leg->lasts_us[axis] = leg->to[axis] == from ? 0 : (leg->lasts_us[axis] + 1u) / 2u;
+    }
+    note_point(c, now, DR_NOTE_LEG, dr_leg_lasts_us(leg), leg->to);
+    return true;
+}
+
 /* -- Setting up ------------------------------------------------------------------------------------------------------ */
 
 void dr_drive_init(dr_drive *drive, dr_stage_id id)
@@ -1042,5 +1061,5 @@ void dr_controller_init(dr_controller *c, dr_kind kind, dr_drive *drives, uint8_
 void dr_controller_start(dr_controller *c, dr_us now)
 {
     set_out(c);
-    note_value(c, now, DR_NOTE_POWER_ON, DR_OP_NONE, 0);
+    note_value(c, now, DR_NOTE_STARTED, DR_OP_NONE, 0);
 }

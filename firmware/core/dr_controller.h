@@ -92,7 +92,7 @@ typedef struct {
     uint32_t home_steps[DR_AXES]; /* TRIO */
     dr_notes *notes;              /* where events go; NULL: nowhere */
 
-    /* to be read by anybody, written by dr_controller only (but a fault injector may shorten `leg` just after it began) */
+    /* to be read by anybody, written by dr_controller only */
     uint8_t state;                                     /* dr_state */
     uint8_t active;                                    /* index of the drive that commands act on */
     bool streaming;                                    /* 'O' */
@@ -190,6 +190,13 @@ typedef enum {
  * move to the work position needs one that is stored and, on an MPC-200, a drive at home, as 'Y' does. */
 bool dr_controller_apply(dr_controller *c, dr_us now, dr_effect effect, uint8_t value);
 
+/* -- Rehearsing faults of the mechanics ------------------------------------------------------------------------------- */
+
+/* The leg that begins now goes wrong: it lasts `times` times as long, and `axis` (DR_AXES: none) gets half of its way only
+ * and is there in half of its time. Positions, streamed frames and ^C are those of the leg as it is then; its DR_NOTE_LEG
+ * comes again. False: no leg begins now, `times` is 0, or the leg would last longer than INT32_MAX us; nothing changes. */
+bool dr_controller_spoil_leg(dr_controller *c, dr_us now, uint8_t axis, uint16_t times);
+
 /* -- Notes: what happened, in order, for traces and judges ------------------------------------------------------------ */
 
 typedef enum {
@@ -219,7 +226,8 @@ typedef enum {
     DR_NOTE_POWER_ON,
     DR_NOTE_CONNECTED, /* value = dr_stage_id */
     DR_NOTE_HAND,      /* a button of the panel: value = dr_effect, bytes[0] = the effect's value */
-    DR_NOTE_PLACED     /* by hand: steps = where */
+    DR_NOTE_PLACED,    /* by hand: steps = where */
+    DR_NOTE_STARTED    /* dr_controller_start() */
 } dr_note_kind;
 
 typedef struct {

@@ -849,6 +849,8 @@ const char *dr_words_note_name(dr_note_kind kind)
         return "hand";
     case DR_NOTE_PLACED:
         return "placed";
+    case DR_NOTE_STARTED:
+        return "started";
     }
     return "?";
 }
@@ -994,6 +996,9 @@ size_t dr_words_note(char *out, size_t room, const dr_words_context *context, co
         break;
     case DR_NOTE_POWER_ON:
         add(&t, "power on");
+        break;
+    case DR_NOTE_STARTED:
+        add(&t, "it has been on for a while");
         break;
     case DR_NOTE_CONNECTED:
         if (note->value == DR_STAGE_NONE)

@@ -1,6 +1,7 @@
 """The control channel: every verb, what it refuses and what it says then; time that moves when it is told to."""
 import json
 import os
+import select
 import socket
 import stat
 import subprocess
@@ -113,6 +114,26 @@ class Hands(unittest.TestCase):
             self.assertEqual(e.controller()["state"], "rest")
             self.assertIn("cycle", e.refuses("power up"))
 
+    def test_power_off_with_and_without_the_positions(self):
+        with Rehearsal("mpc", "--clock", "step") as e, Port(e.path) as port:
+            for how, told, trusted in (("", 24000, "calibrated"), (" forget", 0, "uncalibrated, power-cycled")):
+                e.do("set position 0,0,0")
+                port.send(b"M" + point(48000, 0, 0))  # a second
+                e.do("advance 500ms")
+                e.do(f"power cycle 2s{how}")
+                e.do("advance 2s")
+                self.assertEqual(port.ask(b"C", 14), b"\x01" + point(told, 0, 0) + CR)
+                device = e.controller()["devices"][0]
+                self.assertEqual((device["tip_steps"], device["calibration"]), ([24000, 0, 0], trusted))
+            port.send(b"N")  # finds the ends
+            e.do("advance until idle")
+            self.assertEqual(port.receive(1), CR)
+            device = e.controller()["devices"][0]
+            self.assertEqual((device["tip_steps"], device["calibration"]), ([0, 0, 0], "calibrated"))
+            e.do("power off forget")
+            for line, words in (("power cycle forget 2s", "too many"), ("power on forget", "too many"), ("power cycle soon", "unit")):
+                self.assertIn(words, e.refuses(line), line)
+
     def test_devices(self):
         with Rehearsal("mpc", "--device", "MP-285", "--device", "MP-845") as e, Port(e.path) as port:
             e.do("device 2 unplug")
@@ -145,6 +166,50 @@ class Hands(unittest.TestCase):
             e.do("usb plug")
             with Port(e.link) as port:
                 self.assertEqual(port.ask(b"K", 4), emu.ACTIVE[1])
+
+    def test_a_fault_takes_the_cable_out_when_a_command_has_arrived(self):
+        for clock in (["--clock", "step"], ["--clock", "step", "--pace", "on"], ["--clock", "jump"], []):
+            with Rehearsal("mpc", *clock) as e:
+                e.do("fault usb-unplug 1s on M")
+                with Port(e.link) as port:
+                    port.send(b"K")
+                    e.do("advance 1s" if "step" in clock else "state")
+                    self.assertEqual(port.receive(4), emu.ACTIVE[1])
+                    port.send(b"M" + point(1600, 0, 0))
+                    if "step" in clock:
+                        e.do("advance 900ms")
+                        self.assertFalse(os.path.lexists(e.link))
+                        e.do("advance 2s")
+                    hung_up = select.poll()
+                    hung_up.register(port.fd, 0)
+                    self.assertEqual([event for _, event in hung_up.poll(emu.LIMIT_S * 1000)], [select.POLLHUP | select.POLLERR])
+                    try:
+                        self.assertEqual(os.read(port.fd, 1), b"")
+                    except OSError:
+                        pass
+                emu.wait_until(lambda: os.path.lexists(e.link), "the link is there again")
+                with Port(e.link) as port:  # the move was made, its CR is gone with the cable
+                    port.send(b"C")
+                    if "step" in clock:
+                        e.do("advance 1s")
+                    self.assertEqual(port.receive(14), b"\x01" + point(1600, 0, 0) + CR)
+
+    def test_a_fault_takes_the_power_in_a_move(self):
+        with Rehearsal("mpc", "--clock", "step") as e, Port(e.path) as port:
+            e.do("fault power-loss 2s on M")
+            port.send(b"M" + point(48000, 0, 0))
+            e.do("advance 500ms")
+            self.assertEqual(e.controller()["state"], "off")
+            self.assertTrue(e.do("advance until idle")["idle"])
+            self.assertEqual(e.do("state")["now_us"], 2500000)
+            self.assertEqual(port.ask(b"C", 14), b"\x01" + point(24000, 0, 0) + CR)
+
+    def test_a_fault_that_can_never_strike_is_refused(self):
+        with Rehearsal("mpc") as e:
+            for line, words in (("fault stall-axis x on C", "moves"), ("fault slow-motion on K", "moves"), ("fault slow-motion 1", "2"),
+                                ("fault power-loss on U", "moves"), ("fault torn-frame on M", "streamed"),
+                                ("fault ignore-stop on M", "^C"), ("fault slow-motion 3 3", "next")):
+                self.assertIn(words, e.refuses(line), line)
 
     def test_settings(self):
         with Rehearsal("trio") as e, Port(e.path) as port:

@@ -224,7 +224,7 @@ class Faults(unittest.TestCase):
         names = {entry["fault"] for entry in self.e.do("faults")["faults"]}
         self.assertEqual(names, {"drop-byte", "delay-byte", "duplicate-byte", "corrupt-byte", "drop-cr", "late-cr", "stray-bytes",
                                  "slow-answer", "short-frame", "torn-frame", "lose-host-byte", "ignore-stop", "wedge",
-                                 "stall-axis", "slip-axis"})
+                                 "stall-axis", "slip-axis", "slow-motion", "power-loss", "power-loss-forget", "usb-unplug"})
 
 
 if __name__ == "__main__":

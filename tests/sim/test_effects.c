@@ -345,8 +345,32 @@ static void effects_are_noted(void)
     TEST_ASSERT_EQUAL(7, note.bytes[0]);
 }
 
+/* -- Rehearsing faults ------------------------------------------------------------------------------------------------- */
+
+static void a_leg_is_spoilt_as_it_begins_and_not_later(void)
+{
+    mpc_at(0, 0, 0);
+    TEST_ASSERT_FALSE(dr_controller_spoil_leg(&rig.c, sim_clock(&rig), DR_X, 2)); /* nothing moves */
+    send_point('M', 400000, 0, 0);                                                /* 8.3 s */
+    TEST_ASSERT_FALSE(dr_controller_spoil_leg(&rig.c, sim_clock(&rig), DR_X, 300));
+    sim_run_out(&rig);
+    expect_cr(takes_us(400000, 4, 3000));
+    send_point('M', 400016, 32, 0); /* beyond: it stays */
+    const uint64_t began_us = rig.now_us;
+    TEST_ASSERT_FALSE(dr_controller_spoil_leg(&rig.c, sim_clock(&rig), DR_X, 0));
+    TEST_ASSERT_TRUE(dr_controller_spoil_leg(&rig.c, sim_clock(&rig), DR_Y, 10));
+    TEST_ASSERT_EQUAL_UINT32(16, rig.c.leg.to[DR_Y]);
+    sim_run(&rig, 1);
+    TEST_ASSERT_FALSE(dr_controller_spoil_leg(&rig.c, sim_clock(&rig), DR_X, 2));
+    sim_run_out(&rig);
+    expect_cr(began_us + 10 * takes_us(32, 4, 3000) / 2);
+    expect_at(0, 400000, 16, 0);
+    expect_idle();
+}
+
 static void tests(void)
 {
+    RUN_TEST(a_leg_is_spoilt_as_it_begins_and_not_later);
     RUN_TEST(home_and_work_buttons_move_without_a_cr);
     RUN_TEST(the_lock_out_holds_for_the_home_button_too);
     RUN_TEST(a_pause_at_any_instant_gains_and_loses_nothing);

@@ -287,7 +287,7 @@ static void a_smaller_drive_does_not_leave_its_travel(void)
 static void notes_tell_what_happened_in_order(void)
 {
     mpc_at(0, 0, 0);
-    (void)expect_note(DR_NOTE_POWER_ON);
+    (void)expect_note(DR_NOTE_STARTED);
     send_point('M', 16, 32, 0);
     sim_run(&rig, 10);
     send_code('K');

@@ -379,8 +379,8 @@ static void test_notes(void)
 
 static void test_every_note_has_a_name_and_a_line(void)
 {
-    const char *seen[DR_NOTE_PLACED + 1];
-    for (unsigned kind = 0; kind <= DR_NOTE_PLACED; kind++) {
+    const char *seen[DR_NOTE_STARTED + 1];
+    for (unsigned kind = 0; kind <= DR_NOTE_STARTED; kind++) {
         const dr_note note = {.what = (uint8_t)kind, .op = DR_OP_MPC_MOVE, .bytes = {0x4D}, .count = 1};
         TEST_ASSERT_TRUE(dr_words_note(said, sizeof said, &mpc, &note) > 0);
         TEST_ASSERT_NULL(strpbrk(said, "\r\n"));
@@ -389,7 +389,7 @@ static void test_every_note_has_a_name_and_a_line(void)
         for (unsigned before = 0; before < kind; before++)
             TEST_ASSERT_TRUE(strcmp(seen[kind], seen[before]) != 0);
     }
-    TEST_ASSERT_EQUAL_STRING("?", dr_words_note_name((dr_note_kind)(DR_NOTE_PLACED + 1)));
+    TEST_ASSERT_EQUAL_STRING("?", dr_words_note_name((dr_note_kind)(DR_NOTE_STARTED + 1)));
 }
 
 /* -- Room ---------------------------------------------------------------------------------------------------------- */
