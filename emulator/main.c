@@ -232,11 +232,12 @@ static void set_environment(const program *p)
 
 /* -- From beginning to end ----------------------------------------------------------------------------------------------- */
 
-/* A program that is started without stdin, stdout or stderr must not get a port under their numbers. */
+/* A program that is started without stdin, stdout or stderr must not get a port under their numbers. The command of `run` is
+ * without them as well. */
 static void fill_standard_fds(void)
 {
     int fd;
-    while ((fd = open("/dev/null", O_RDWR)) >= 0 && fd <= STDERR_FILENO) {}
+    while ((fd = open("/dev/null", O_RDWR | O_CLOEXEC)) >= 0 && fd <= STDERR_FILENO) {}
     if (fd > STDERR_FILENO)
         (void)close(fd);
 }

@@ -1,5 +1,6 @@
 """`dryrig-emu run`: the command's exit status, signals, streams and environment are its own, and nothing is left behind."""
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -63,8 +64,10 @@ class Run(unittest.TestCase):
         self.assertEqual(self.run_("mpc", "--", "/").returncode, 126)
 
     def test_signals_are_passed_on(self):
-        script = "trap 'echo got; exit 9' TERM; trap 'exit 8' USR1; trap 'exit 7' INT; echo up; while :; do read x; done"
-        for number, status in ((signal.SIGTERM, 9), (signal.SIGUSR1, 8), (signal.SIGINT, 7)):
+        script = ("trap 'exit 10' TERM; trap 'exit 8' USR1; trap 'exit 7' INT; trap 'exit 9' HUP; trap 'exit 11' QUIT; "
+                  "trap 'exit 12' USR2; echo up; while :; do read x; done")
+        for number, status in ((signal.SIGTERM, 10), (signal.SIGUSR1, 8), (signal.SIGINT, 7), (signal.SIGHUP, 9),
+                               (signal.SIGQUIT, 11), (signal.SIGUSR2, 12)):
             process = subprocess.Popen([emu.PROGRAM, "run", "mpc", "--", "bash", "-c", script], stdin=subprocess.PIPE,
                                        stdout=subprocess.PIPE, env=self.environment)
             self.assertEqual(process.stdout.readline(), b"up\n")
@@ -105,8 +108,79 @@ class Run(unittest.TestCase):
         self.assertEqual(results, [True] * 20)
 
     def test_many_in_a_row_leave_nothing(self):
-        for _ in range(100):
+        for _ in range(int(os.environ.get("DRYRIG_RUNS", "100"))):
             self.assertEqual(self.run_("trio", "--", "true").returncode, 0)
+        self.assertEqual(self.processes(), [])
+        with open("/proc/net/unix", encoding="utf-8", errors="replace") as file:
+            self.assertEqual([line for line in file if self.directory in line], [])
+
+    def processes(self):
+        """Those that have been started here and are still there."""
+        found = []
+        for number in filter(str.isdigit, os.listdir("/proc")):
+            try:
+                with open(f"/proc/{number}/environ", "rb") as file:
+                    if b"TMPDIR=" + self.directory.encode() in file.read().split(b"\0"):
+                        found.append(int(number))
+            except OSError:
+                pass  # it has ended meanwhile, or is somebody else's
+        return found
+
+    def test_streams_that_are_closed_or_full_are_so_for_the_command_too(self):
+        script = "echo x 2>/dev/null; a=$?; echo y >&2; echo $a $? >>status; exit 5"
+        for ending in (">&-", ">/dev/full", "2>&-", "<&- >&- 2>&-"):
+            seen = []
+            for before in ([], [emu.PROGRAM, "run", "mpc", "--lint=off", "--"]):
+                done = subprocess.run(["sh", "-c", f'"$@" {ending}', "sh", *before, "sh", "-c", script], check=False,
+                                      capture_output=True, env=self.environment, cwd=self.directory, timeout=emu.LIMIT_S)
+                with open(os.path.join(self.directory, "status"), encoding="ascii") as file:
+                    seen.append((done.returncode, file.read(), done.stdout))
+                os.remove(os.path.join(self.directory, "status"))
+            self.assertEqual(seen[0], seen[1], ending)
+
+    def test_a_command_that_closes_its_streams(self):
+        self.assertEqual(self.run_("mpc", "--", "sh", "-c", "exec <&- >&- 2>&-; exit 6").returncode, 6)
+
+    def start_(self, script, *options):
+        process = subprocess.Popen([emu.PROGRAM, "run", *options, "mpc", "--", "bash", "-c", script], stdin=subprocess.PIPE,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=self.environment)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        return process
+
+    def test_a_command_that_does_not_mind_a_signal_goes_on(self):
+        process = self.start_("trap 'echo no' TERM HUP; trap 'exit 5' USR2; echo up; while :; do read -t 0.01 x; done")
+        self.assertEqual(process.stdout.readline(), b"up\n")
+        for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGTERM):
+            process.send_signal(number)
+            self.assertEqual(process.stdout.readline(), b"no\n")
+        self.assertIsNone(process.poll())
+        process.send_signal(signal.SIGUSR2)
+        self.assertEqual(process.wait(timeout=emu.LIMIT_S), 5)
+
+    def test_what_the_command_leaves_running_is_not_waited_for(self):
+        process = self.start_('exec 3<>"$DRYRIG_PORT"; (trap "" HUP; read -u 3 x; echo "gone $x" >"$TMPDIR/late") & echo $!; exit 4')
+        process.stdout.readline()
+        self.assertEqual(process.wait(timeout=emu.LIMIT_S), 4)  # it reads the port as long as there is one
+        late = os.path.join(self.directory, "late")
+        emu.wait_until(lambda: os.path.exists(late) and os.path.getsize(late) > 0, "the port of one left running hangs up")
+        os.remove(late)
+        emu.wait_until(lambda: self.processes() == [], "it ends")
+
+    def test_the_runner_is_killed(self):
+        """Nobody can clean up then: the command goes on with a port that has hung up; the next run puts the link right."""
+        link = os.path.join(self.directory, "rig")
+        process = self.start_('exec 3<>"$DRYRIG_PORT"; echo up; read -u 3 x; echo "hung up $x"; exit 0', "--link", link)
+        self.assertEqual(process.stdout.readline(), b"up\n")
+        process.kill()
+        self.assertEqual(process.stdout.readline(), b"hung up \n")
+        process.wait(timeout=emu.LIMIT_S)
+        emu.wait_until(lambda: self.processes() == [], "the command ends")
+        self.assertTrue(os.path.islink(link))
+        for left in os.listdir(self.directory):  # what was the killed one's own
+            if left.startswith("dryrig-"):
+                shutil.rmtree(os.path.join(self.directory, left))
+        self.assertEqual(self.run_("mpc", "--link", link, "--", sys.executable, "-c", HOST).stdout, b"\x01\x21\x03\r")
 
     def test_wrong_options(self):
         for args, words in ((["mpc"], "which command"), (["mpc", "--"], "which command"), (["--", "true"], "trio or mpc"),
