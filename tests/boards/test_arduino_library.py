@@ -55,6 +55,20 @@ class Library(unittest.TestCase):
         self.assertEqual(between(sent, 1_500_000, 1_600_000), point(10667, 10667, 10667) + b"\x1e\r")
         self.assertEqual(between(sent, 1_600_000, 2_000_000), b"\r" + point(0, 10667, 10667) + b"\x1e\r")
 
+    def test_the_example_with_hands_has_buttons_and_a_knob(self):
+        image = self.compiled(self.library / "examples/Hands/Hands.ino")
+        events = [(2_500_000, "low C0"), (2_504_000, "low C1"), (2_508_000, "open C0"), (2_512_000, "open C1"),  # knob X on A0, A1
+                  (2_600_000, b"c"), (2_700_000, "low D6"), (2_800_000, "open D6"), (3_600_000, b"c"), (3_650_000, "stop")]  # HOME
+        pins = []
+        sent = images.run([str(RUNNER), "--watch", "B5", "--script", "-", "atmega328p", str(image)], events, pins)
+        self.assertEqual(between(sent, 2_500_000, 3_000_000), point(10667 + 64, 10667, 10667) + b"\x1e\r")
+        self.assertEqual(between(sent, 3_000_000, 3_650_000), point(0, 0, 0) + b"\x1e\r")
+        self.assertEqual([level for us, _, level in pins if us > 2_600_000], [1, 0])  # the LED while it moves
+
+    def test_an_example_without_hands_does_not_pay_for_them(self):
+        plain, hands = (self.compiled(self.library / f"examples/{name}/{name}.ino").stat().st_size for name in ("Emulator", "Hands"))
+        self.assertLess(plain + 5000, hands)
+
     def test_it_has_what_the_ide_asks_for(self):
         properties = dict(line.split("=", 1) for line in (self.library / "library.properties").read_text().splitlines())
         for name in "name version author maintainer sentence paragraph category architectures".split():

@@ -47,6 +47,18 @@ class Pico(unittest.TestCase):
         reply = [us for us, _ in sent if us >= events[1][0]][:14]
         self.assertAlmostEqual(reply[-1] - reply[0], 13 * 78.125, delta=100)
 
+    def test_buttons_and_knobs(self):
+        # Knob X (GP12, 13) a detent; STOP (GP8) ends a host's move; MANIPULATOR (GP11).
+        at = READY_US
+        events = [(at, "low 12"), (at + 2000, "low 13"), (at + 4000, "open 12"), (at + 6000, "open 13"), (at + 10_000, b"C"),
+                  (at + 14_000, b"M" + point(16000, 0, 0)), (at + 20_000, "low 8"), (at + 40_000, b"K"), (at + 45_000, "low 11"),
+                  (at + 60_000, b"K"), (at + 65_000, "stop")]
+        sent = run("mpc-hands", events)
+        self.assertEqual(between(sent, at, at + 14_000), b"\x01" + point(64, 0, 0) + b"\r")
+        self.assertEqual(between(sent, at + 14_000, at + 25_000), b"")
+        self.assertEqual(between(sent, at + 25_000, at + 40_000), b"\r")  # 8 looks later; the way takes 330 ms
+        self.assertEqual(between(sent, at + 40_000, at + 65_000), b"\x01\x21\x03\r\x02\x21\x03\r")
+
     def test_stream_and_interrupt(self):
         begin = READY_US + 80_000
         sent = run("mpc", [(READY_US, b"O"), (READY_US + 10_000, b"S"), (READY_US + 40_000, b"\x03"), (begin, point(3200, 0, 0)),

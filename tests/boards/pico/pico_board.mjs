@@ -3,7 +3,8 @@
 //     node pico_board.mjs RP2040JS ROM.bin IMAGE.bin --script            the script on stdin, what the board says on stdout
 //     node pico_board.mjs RP2040JS ROM.bin IMAGE.bin --socket PATH       a Unix socket; prints "ready PATH"
 //
-// Script and output are those of avr_board: "US HEX...", "US stop"; "US HEX" for each byte, in the board's own time.
+// Script and output are those of avr_board: "US HEX...", "US low GP...", "US open GP...", "US stop"; "US HEX" for each byte, in
+// the board's own time.
 // --memory FILE keeps the last two sectors of the flash there; --straps N closes these straps (bit 0: GP2). RP2040JS is
 // the directory of that package.
 import fs from 'node:fs';
@@ -54,6 +55,8 @@ mcu.onBreak = code => {
 };
 const closed = Number(option('--straps') ?? 0);
 [2, 3, 4, 5].forEach((pin, bit) => mcu.gpio[pin].setInputValue((closed >> bit & 1) === 0)); // it has no pull-ups
+for (let pin = 6; pin <= 21; pin++)
+    mcu.gpio[pin].setInputValue(true);
 const cdc = new USBCDC(mcu.usbCtrl);
 let connected = false;
 cdc.onDeviceConnected = () => { connected = true; };
@@ -82,6 +85,10 @@ if (rest.includes('--script')) {
         if (what[0] === 'stop' || what[0] === 'off') {
             save();
             process.exit(0);
+        }
+        if (what[0] === 'low' || what[0] === 'open') {
+            what.slice(1).forEach(pin => mcu.gpio[Number(pin)].setInputValue(what[0] === 'open'));
+            continue;
         }
         what.forEach(byte => cdc.sendSerialByte(parseInt(byte, 16)));
     }
