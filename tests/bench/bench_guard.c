@@ -165,12 +165,12 @@ static void write_config(const char *kind)
     if (file == NULL)
         give_up(config);
     (void)fprintf(file,
-                  "format = 1; revision = 1; %s drives = ( { number = 1; device = \"MP-845\"; microstep_um = %s;\n"
+                  "format = 1; revision = 1; %s drives = ( { number = 1; device = \"MP-845\"; microstep_um = %s\n"
                   "box_um = { x = (0, 20000); y = (0, 20000); z = (0, 20000); }; } );\n",
                   is_mpc ? "profile = \"mpc-200\"; firmware = \"3.21\";"
                          : "profile = \"trio-mp245a\"; firmware = \"3.12\"; external_switch5_on = true; "
                            "external_switch6_on = false;",
-                  is_mpc ? "0.046875" : "0.09375");
+                  is_mpc ? "0.046875; switch8_on = true;" : "0.09375;");
     if (fclose(file) != 0)
         give_up(config);
 }

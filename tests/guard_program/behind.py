@@ -18,12 +18,12 @@ TRAVEL_UM = {("mpc", "MP-265"): (25000, 12500, 25000), ("mpc", "MT-800"): (22000
              ("trio", "MP-845"): (25000.03125, 25000.03125, 25000.03125)} # all of it, or home and work are refused
 CONFIG = {"mpc": 'profile = "mpc-200"; firmware = "3.21"; mpc_home = "zero"; allow_stream = true;',
           "trio": 'profile = "trio-mp245a"; firmware = "3.12"; external_switch5_on = true; external_switch6_on = false;'}
-DRIVE = """{ number = %d; device = "%s"; microstep_um = %s; max_move_um = 50000;
+DRIVE = """{ number = %d; device = "%s"; microstep_um = %s; %s max_move_um = 50000;
     box_um = { x = (0, %s); y = (0, %s); z = (0, %s); }; }"""
 
 
 def config(kind, stages):
-    drives = [DRIVE % (i + 1, stage, MICROSTEPS[kind][stage], *TRAVEL_UM.get((kind, stage), (25000, 25000, 25000)))
+    drives = [DRIVE % (i + 1, stage, MICROSTEPS[kind][stage], "switch8_on = true;" if kind == "mpc" else "", *TRAVEL_UM.get((kind, stage), (25000, 25000, 25000)))
               for i, stage in enumerate(stages)]
     return ("format = 1; revision = 1; knobs_locked = true; margin_um = 0; unstoppable_ms = 60000; allow_calibrate = true; "
             f"{CONFIG[kind]} drives = ( {', '.join(drives)} );")

@@ -17,7 +17,7 @@ PROGRAM = os.environ["DRYRIG_GUARD"]
 MPC = """
 format = 1; revision = 1; profile = "mpc-200"; firmware = "3.21";
 knobs_locked = true; margin_um = %(margin)s; unstoppable_ms = 60000; %(more)s
-drives = ( { number = 1; device = "MP-225"; microstep_um = 0.0625; max_move_um = 40000; %(drive)s
+drives = ( { number = 1; device = "MP-225"; microstep_um = 0.0625; switch8_on = true; max_move_um = 40000; %(drive)s
     box_um = { x = (%(low)s, %(high)s); y = (%(low)s, %(high)s); z = (%(low)s, %(high)s); }; } );
 %(keepouts)s
 """

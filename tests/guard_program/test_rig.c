@@ -81,10 +81,12 @@ static const char mpc[] = "format = 1;\n"
                           "  { number = 2;\n"
                           "    device = \"MP-285\";\n"
                           "    microstep_um = 0.0625;\n"
+                          "    switch8_on = true;\n"
                           "    box_um = { x = (0, 25000); y = (0, 25000); z = (0, 25000); }; },\n"
                           "  { number = 4;\n"
                           "    device = \"MT-800\";\n"
                           "    microstep_um = 0.078125;\n"
+                          "    switch8_on = true;\n"
                           "    box_um = { x = (0.001, 21999.999); y = (0, 22000); z = (0, 22000); }; } );\n";
 
 static rig read_rig;
@@ -198,6 +200,10 @@ static void facts_and_permissions_become_bits(void)
         {trio, "knobs_locked = false", "knobs_locked = true", DR_RIG_KNOBS_LOCKED},
         {trio, "\"documented\"", "\"hull\"", DR_RIG_PATHS_UNKNOWN},
         {trio, "allow_calibrate = false", "allow_calibrate = true", DR_RIG_MAY_CALIBRATE},
+        {mpc, "switch8_on = true;\n    box_um = { x = (0, ", "switch8_on = false;\n    box_um = { x = (0, ",
+         DR_RIG_HOME_IS_ZERO | DR_RIG_MAY_STREAM | DR_RIG_Y_LOCKED_OUT << 1},
+        {mpc, "switch8_on = true;\n    box_um = { x = (0.", "switch8_on = false;\n    box_um = { x = (0.",
+         DR_RIG_HOME_IS_ZERO | DR_RIG_MAY_STREAM | DR_RIG_Y_LOCKED_OUT << 3},
     };
     for (size_t i = 0; i < sizeof facts / sizeof facts[0]; i++) {
         TEST_ASSERT_TRUE_MESSAGE(read_changed(facts[i].text, facts[i].find, facts[i].put), why);
@@ -320,6 +326,8 @@ static const mutant mutants[] = {
     {trio, "revision = 7;", "revision = 7; allow_stream = true;", 0, "no key 'allow_stream'"},
     {mpc, "revision = 1;", "revision = 1; angle_min_deg = 10;", 0, "no key 'angle_min_deg'"},
     {mpc, "revision = 1;", "revision = 1; external_switch6_on = true;", 0, "no key 'external_switch6_on'"},
+    {mpc, "revision = 1;", "revision = 1; switch8_on = true;", 0, "no key 'switch8_on'"},
+    {trio, "number = 1;", "number = 1; switch8_on = true;", 0, "no key 'switch8_on'"},
     /* keys that are missing: the error stands where the group begins */
     {trio, "format = 1;\n", "", 0, "'format' is missing"},
     {trio, "revision = 7;\n", "", -1, "'revision' is missing"},
@@ -341,6 +349,7 @@ static const mutant mutants[] = {
     {trio, "      radius_to = 4000; };", "};", -6, "'radius_to' is missing"},
     {trio, "      centre = (12500, 12500);", "", -2, "'centre' is missing"},
     {mpc, "device = \"MP-285\";", "", -1, "'device' is missing"},
+    {mpc, "    switch8_on = true;\n", "", -3, "'switch8_on' is missing; it has no default"},
     /* values of the wrong kind */
     {trio, "format = 1;", "format = \"1\";", 0, "'format' is a whole number"},
     {trio, "format = 1;", "format = 2;", 0, "'format' is 2; this program knows format 1"},
@@ -356,6 +365,7 @@ static const mutant mutants[] = {
     {trio, "\"FT123\"", "\"FT 12\"", 0, "without blanks"},
     {trio, "switch5_on = true", "switch5_on = 1", 0, "'external_switch5_on' is true or false"},
     {trio, "switch6_on = false", "switch6_on = \"off\"", 0, "'external_switch6_on' is true or false"},
+    {mpc, "switch8_on = true", "switch8_on = 8", 0, "'switch8_on' is true or false"},
     {trio, "\"silent\"", "\"cr\"", 0, "'refusal' is \"cr\": expected one of \"silent\", \"E\""},
     {trio, "\"stop\"", "\"continue\"", 0, "'on_host_loss' is \"continue\""},
     {trio, "\"documented\"", "\"exact\"", 0, "'path_model' is \"exact\""},

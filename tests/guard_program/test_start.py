@@ -1,5 +1,6 @@
 """Starting and ending dryrig-guard: exit statuses, what is left behind, kill -9 of everybody in every order."""
 import os
+import re
 import shlex
 import signal
 import stat
@@ -160,6 +161,41 @@ class Telling(unittest.TestCase):
                     self.assertIn(word, err)
 
 
+class Compiling(unittest.TestCase):
+    def test_a_binary_is_what_the_text_is(self):
+        with emu.directory() as directory:
+            conf, binary = config_file(directory, rig(guard.TRIO, keepouts=guard.POST)), directory + "/rig.bin"
+            status, out, err = guard.run("compile", conf, "-o", binary)
+            self.assertEqual((status, err), (0, ""))
+            told = re.fullmatch(rf"{binary}: (\d+) bytes, revision 1, hash ([0-9A-F]{{8}})\n", out)
+            self.assertEqual(os.stat(binary).st_size, int(told[1]))
+            self.assertEqual(sorted(os.listdir(directory)), ["rig.bin", "rig.conf"])
+            for path in (conf, binary):
+                self.assertIn(told[2], guard.run("check", path)[1])
+            motion = ("--from", "0,2500,100", "line 4000 2500 100 speed 15")
+            self.assertEqual([guard.run("explain", path, *motion)[0] for path in (conf, binary)], [4, 4])
+            with open(binary, "r+b") as file:
+                file.seek(100)
+                file.write(b"\xff")
+            status, out, err = guard.run("check", binary)
+            self.assertEqual((status, out), (3, ""))
+            self.assertIn(f"{binary}: a compiled configuration that is damaged", err)
+
+    def test_what_is_wrong(self):
+        with emu.directory() as directory:
+            conf, binary = config_file(directory), directory + "/rig.bin"
+            for status, words, *args in ((2, "expected a configuration and --output", conf), (2, "given twice", conf, "-o", "a", "-o", "b"),
+                                         (3, "No such file", conf + "x", "-o", binary), (1, "is no file", conf, "-o", "/dev/null")):
+                code, out, err = guard.run("compile", *args)
+                self.assertEqual((args, code, out), (args, status, ""))
+                self.assertIn(words, err)
+            self.assertEqual(guard.run("compile", conf, "-o", binary)[0], 0)
+            conf = config_file(directory, rig(guard.MPC, margin=1))
+            status, out, err = guard.run("compile", conf, "--output", binary)
+            self.assertEqual((status, out), (4, ""))
+            self.assertIn("needs a higher 'revision' than 1", err)
+
+
 class Killed(unittest.TestCase):
     """kill -9 in mid-move, of each, in every order of starting again: locked or disarmed, and nothing moves by itself."""
 
@@ -190,7 +226,8 @@ class Killed(unittest.TestCase):
         self.host.stdin.write(line(0, 2000, 0, 0))
         self.host.stdin.flush()
         self.guard.wait_for("moving")
-        guard.pause(0.1) # until the whole frame is there: it has a pause of 35 ms within
+        emu.wait_until(lambda: not self.guard.status()["within_frame"], "the frame to leave: it has a pause of 35 ms within")
+        guard.pause(0.1) # its last bytes are on the line
 
     def restart_device(self):
         self.emulator = emu.Emulator("mpc", "--link", self.device_link)

@@ -358,7 +358,7 @@ static int start_and_run(bridge *b, bool after_crash)
     struct pollfd fds[FDS];
     introduce(b);
     dr_guard_init(&b->guard, &b->rig.limits, b->ring, BRIDGE_RING);
-    dr_guard_start(&b->guard, bridge_now(b), after_crash);
+    dr_guard_start(&b->guard, bridge_now(b), after_crash ? DR_START_AFTER_RESET : DR_START_POWER_ON);
     if (printf("ready %s\n", b->host.path) < 0 || fflush(stdout) != 0)
         return fail("cannot write the line 'ready' to stdout", strerror(errno));
     read_hints(b);

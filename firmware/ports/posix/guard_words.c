@@ -300,7 +300,9 @@ size_t guard_words_record(char *out, size_t room, const rig *r, const dr_record 
     switch (record->event) {
     case DR_EVENT_START:
         add(&s, "configuration %08X, revision %u%s", record->position_steps[0], record->position_steps[1],
-            record->code != 0 ? "; the last guard was not stopped in order" : "");
+            record->code == DR_START_POWER_ON    ? ""
+            : record->code == DR_START_MID_FRAME ? "; the last guard ended within a frame"
+                                                 : "; the last guard was not stopped in order");
         break;
     case DR_EVENT_STATE:
         add(&s, "%s to %s%s%s", guard_words_state(record->before), guard_words_state(record->after),

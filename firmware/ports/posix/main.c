@@ -3,6 +3,7 @@
  *     dryrig-guard --port PATH --config FILE ...    bridge: runs until a signal
  *     dryrig-guard check FILE                       explain_rig(): what a configuration means
  *     dryrig-guard explain FILE --from X,Y,Z "..."  explain_motion(): would this pass?
+ *     dryrig-guard compile FILE --output FILE       image_write(): for a microcontroller
  *     dryrig-guard ctl SOCKET ORDER                 ctl: orders to a guard that runs
  *     dryrig-guard log FILE                         journal_verify(): is a log whole?
  */
@@ -10,6 +11,7 @@
 #include "bridge.h"
 #include "ctl.h"
 #include "explain.h"
+#include "image.h"
 
 #include <argp.h>
 #include <fcntl.h>
@@ -26,7 +28,8 @@ const char *argp_program_version = "dryrig-guard " DRYRIG_VERSION;
 #define STATUS_WORDS                                                                                                   \
     "Exit status: 0 done (run: stopped by a signal); 1 a port, link, socket or file cannot be had; 2 wrong options; "  \
     "3 the "                                                                                                           \
-    "configuration is wrong; 4 the answer is no (explain: refused; ctl: not done; log: not whole)."
+    "configuration is wrong; 4 the answer is no (explain: refused; compile: no higher revision; ctl: not done; log: "  \
+    "not whole)."
 
 static bool read_config(rig *r, const char *path)
 {
@@ -59,7 +62,22 @@ static unsigned read_number(const struct argp_state *state, const char *name, co
 
 /* -- run --------------------------------------------------------------------------------------------------------------- */
 
-enum { PORT = 256, CONFIG, LINK, CONTROL, LOG, RECORD, FROM, DRIVE, ANGLE, IN_TISSUE, MAY_CALIBRATE, FOLLOW, JSON };
+enum {
+    OUTPUT = 'o',
+    PORT = 256,
+    CONFIG,
+    LINK,
+    CONTROL,
+    LOG,
+    RECORD,
+    FROM,
+    DRIVE,
+    ANGLE,
+    IN_TISSUE,
+    MAY_CALIBRATE,
+    FOLLOW,
+    JSON
+};
 
 static error_t parse_run(int key, char *value, struct argp_state *state)
 {
@@ -84,7 +102,7 @@ static error_t parse_run(int key, char *value, struct argp_state *state)
         once(state, &o->record, "--record", value);
         break;
     case ARGP_KEY_ARG:
-        argp_error(state, "'%s' is no option, and none of check, explain, ctl, log", value);
+        argp_error(state, "'%s' is no option, and none of check, explain, compile, ctl, log", value);
         break;
     case ARGP_KEY_END:
         if (o->port == NULL)
@@ -113,18 +131,19 @@ static int run(int argc, char **argv)
          "replay'",
          2},
         {NULL, 0, NULL, 0, NULL, 0}};
-    static const struct argp argp = {known,
-                                     parse_run,
-                                     NULL,
-                                     "Stands between a host program and a Sutter TRIO MP-245A or MPC-200 controller "
-                                     "and lets only safe commands through. "
-                                     "The host program opens the port that is printed after 'ready' instead of the "
-                                     "controller's. Other uses: dryrig-guard "
-                                     "check FILE; dryrig-guard explain FILE ...; dryrig-guard ctl SOCKET ...; "
-                                     "dryrig-guard log FILE; each has --help.\v" STATUS_WORDS,
-                                     NULL,
-                                     NULL,
-                                     NULL};
+    static const struct argp argp = {
+        known,
+        parse_run,
+        NULL,
+        "Stands between a host program and a Sutter TRIO MP-245A or MPC-200 controller "
+        "and lets only safe commands through. "
+        "The host program opens the port that is printed after 'ready' instead of the "
+        "controller's. Other uses: dryrig-guard "
+        "check FILE; dryrig-guard explain FILE ...; dryrig-guard compile FILE ...; dryrig-guard ctl SOCKET ...; "
+        "dryrig-guard log FILE; each has --help.\v" STATUS_WORDS,
+        NULL,
+        NULL,
+        NULL};
     static bridge b;
     bridge_options o = {NULL, NULL, NULL, NULL, NULL, NULL};
     (void)argp_parse(&argp, argc, argv, 0, NULL, &o);
@@ -175,6 +194,62 @@ static int verify_log(int argc, char **argv)
     (void)printf("%s: whole, %llu records of %llu starts\n", path, (unsigned long long)records,
                  (unsigned long long)starts);
     return EXIT_DONE;
+}
+
+/* -- compile ----------------------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    const char *from, *to;
+} compile_options;
+
+static error_t parse_compile(int key, char *value, struct argp_state *state)
+{
+    compile_options *const o = state->input;
+    switch (key) {
+    case OUTPUT:
+        once(state, &o->to, "--output", value);
+        break;
+    case ARGP_KEY_ARG:
+        once(state, &o->from, "the configuration", value);
+        break;
+    case ARGP_KEY_END:
+        if (o->from == NULL || o->to == NULL)
+            argp_error(state, "expected a configuration and --output, as: rig.conf -o rig.bin");
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+static int compile(int argc, char **argv)
+{
+    static const struct argp_option known[] = {
+        {"output", OUTPUT, "FILE", 0, "Where the binary goes. It is replaced as a whole, by a higher revision only", 1},
+        {NULL, 0, NULL, 0, NULL, 0}};
+    static const struct argp argp = {known,
+                                     parse_compile,
+                                     "CONFIGURATION",
+                                     "Writes a configuration as the binary that the guard of a microcontroller loads. "
+                                     "'dryrig-guard check' tells what "
+                                     "a binary holds.\v" STATUS_WORDS,
+                                     NULL,
+                                     NULL,
+                                     NULL};
+    static rig r;
+    char why[RIG_WHY_MAX];
+    compile_options o = {NULL, NULL};
+    (void)argp_parse(&argp, argc, argv, 0, NULL, &o);
+    if (!read_config(&r, o.from))
+        return EXIT_CONFIG;
+    const image_result result = image_write(o.to, &r.limits, why, sizeof why);
+    if (result != IMAGE_WRITTEN) {
+        (void)fprintf(stderr, "dryrig-guard: %s\n", why);
+        return result == IMAGE_NOT_NEWER ? EXIT_NO : EXIT_CANNOT;
+    }
+    (void)printf("%s: %u bytes, revision %lu, hash %08lX\n", o.to, DR_LIMITS_IMAGE_BYTES,
+                 (unsigned long)r.limits.revision, (unsigned long)dr_limits_crc(&r.limits));
+    return fflush(stdout) == 0 ? EXIT_DONE : EXIT_CANNOT;
 }
 
 /* -- explain ----------------------------------------------------------------------------------------------------------- */
@@ -329,10 +404,8 @@ int main(int argc, char **argv)
         char shown[24];
         int (*run)(int, char **);
     } uses[] = {
-        {"dryrig-guard check", check},
-        {"dryrig-guard explain", explain},
-        {"dryrig-guard ctl", ctl},
-        {"dryrig-guard log", verify_log},
+        {"dryrig-guard check", check}, {"dryrig-guard explain", explain}, {"dryrig-guard compile", compile},
+        {"dryrig-guard ctl", ctl},     {"dryrig-guard log", verify_log},
     };
     argp_err_exit_status = EXIT_USAGE;
     fill_standard_fds();

@@ -125,6 +125,7 @@ static cJSON *status_object(const bridge *b, const dr_guard_status *status, cons
     (void)cJSON_AddBoolToObject(all, "may_calibrate", status->may_calibrate);
     (void)cJSON_AddBoolToObject(all, "alarm", status->buzzer);
     (void)cJSON_AddBoolToObject(all, "host_open", b->host.opens > 0);
+    (void)cJSON_AddBoolToObject(all, "within_frame", dr_guard_is_mid_frame(&b->guard));
     add_position(b, status, all);
     add_refusal(b, status, all);
     (void)cJSON_AddNumberToObject(all, "forwarded", status->forwarded);

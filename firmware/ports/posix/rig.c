@@ -1,5 +1,7 @@
 #include "rig.h"
 
+#include "image.h"
+
 #include "dr_judge.h" /* dr_judge_place */
 #include "dr_words.h" /* names of stages and controllers */
 
@@ -104,22 +106,19 @@ static void check_text(reader *r, const char *text)
     }
 }
 
-static char *read_file(reader *r)
+/* The file, with a 0 behind it; *size: without. NULL: it cannot be had. */
+static char *read_file(reader *r, size_t *size)
 {
     FILE *file = fopen(r->path, "re");
     char *text = calloc(1, FILE_MAX + 2u);
     if (file == NULL || text == NULL) {
         fail_at(r, 0, "%s", strerror(errno));
     } else {
-        const size_t size = fread(text, 1, FILE_MAX + 1u, file);
+        *size = fread(text, 1, FILE_MAX + 1u, file);
         if (ferror(file) != 0)
             fail_at(r, 0, "%s", strerror(errno));
-        else if (size > FILE_MAX)
+        else if (*size > FILE_MAX)
             fail_at(r, 0, "longer than %u bytes: not a configuration", FILE_MAX);
-        else if (memchr(text, '\0', size) != NULL)
-            fail_at(r, 0, "holds a byte of value 0: not a text");
-        else
-            (void)memcpy(text + size, "\n", 2); /* libconfig wants an end of the last line */
     }
     if (file != NULL)
         (void)fclose(file);
@@ -387,14 +386,22 @@ static void read_stage(reader *r, const config_setting_t *group, uint8_t drive)
     }
 }
 
+static void set_fact(dr_limits *l, uint16_t fact, bool is_so)
+{
+    if (is_so)
+        l->rig = (uint16_t)(l->rig | fact);
+}
+
+#define FOR_ANY_DRIVE "number", "device", "microstep_um", "box_um", "max_move_um", "fastest_level", "surface"
+
 static void read_drive(reader *r, config_setting_t *group)
 {
-    static const char *const known[] = {"number",      "device",        "microstep_um", "box_um",
-                                        "max_move_um", "fastest_level", "surface",      NULL};
+    static const char *const of_trio[] = {FOR_ANY_DRIVE, NULL};
+    static const char *const of_mpc[] = {FOR_ANY_DRIVE, "switch8_on", NULL};
     dr_limits *const l = &r->out->limits;
     if (!is_group(r, group))
         return;
-    allow_only(r, group, known);
+    allow_only(r, group, l->kind == DR_TRIO ? of_trio : of_mpc);
     const config_setting_t *const number = find(r, group, "number", true);
     const config_setting_t *const box = find(r, group, "box_um", true);
     const config_setting_t *const max_move = find(r, group, "max_move_um", false);
@@ -415,6 +422,8 @@ static void read_drive(reader *r, config_setting_t *group)
     d->fast_level = d->slow_level = level(r, group, "fastest_level", DR_SPEED_FULL);
     if (surface != NULL)
         read_surface(r, surface, d);
+    if (l->kind == DR_MPC)
+        set_fact(l, (uint16_t)(DR_RIG_Y_LOCKED_OUT << drive), !flag(r, group, "switch8_on", true));
 }
 
 /* -- Obstacles --------------------------------------------------------------------------------------------------------- */
@@ -535,12 +544,6 @@ static void read_elements(reader *r, config_setting_t *list, void (*read_one)(re
         fail_at(r, line_of(list), "'%s' is a list: ( { ... }, { ... } )", name_of(list));
     for (int i = 0; i < config_setting_length(list) && !r->failed; i++)
         read_one(r, config_setting_get_elem(list, (unsigned)i));
-}
-
-static void set_fact(dr_limits *l, uint16_t fact, bool is_so)
-{
-    if (is_so)
-        l->rig = (uint16_t)(l->rig | fact);
 }
 
 static void read_facts(reader *r, const config_setting_t *root)
@@ -725,24 +728,47 @@ static void check_whole(reader *r, const config_setting_t *root)
             tell_problem(r, root, (dr_limits_problem){DR_LIMITS_NO_ROOM, drive, DR_AXES});
 }
 
+static void read_text(reader *r, char *text, size_t size)
+{
+    config_t config;
+    if (memchr(text, '\0', size) != NULL)
+        fail_at(r, 0, "holds a byte of value 0: not a text");
+    else
+        (void)memcpy(text + size, "\n", 2); /* libconfig wants an end of the last line */
+    check_text(r, text);
+    config_init(&config);
+    if (!r->failed && config_read_string(&config, text) != CONFIG_TRUE)
+        fail_at(r, (unsigned)config_error_line(&config), "%s", config_error_text(&config));
+    if (!r->failed)
+        read_root(r, config_root_setting(&config));
+    if (!r->failed)
+        check_whole(r, config_root_setting(&config));
+    config_destroy(&config);
+}
+
+/* Its obstacles have numbers for names. */
+static void read_image(reader *r, const char *bytes, size_t size)
+{
+    dr_limits_problem problem;
+    if (!dr_limits_get((const uint8_t *)bytes, size, &r->out->limits, &problem))
+        fail_at(r, 0, "%s", image_problem(problem.error));
+    for (unsigned i = 0; !r->failed && i < r->out->limits.obstacle_count; i++)
+        (void)snprintf(r->out->names[i], RIG_NAME_MAX, "obstacle %u", i + 1u);
+}
+
 bool rig_read(rig *out, const char *path, char *why, size_t room)
 {
     reader r = {.path = path, .room = room, .out = out};
-    config_t config;
+    size_t size = 0;
     r.why = why;
     memset(out, 0, sizeof *out);
-    char *const content = read_file(&r);
+    char *const content = read_file(&r, &size);
     if (content == NULL)
         return false;
-    check_text(&r, content);
-    config_init(&config);
-    if (!r.failed && config_read_string(&config, content) != CONFIG_TRUE)
-        fail_at(&r, (unsigned)config_error_line(&config), "%s", config_error_text(&config));
-    if (!r.failed)
-        read_root(&r, config_root_setting(&config));
-    if (!r.failed)
-        check_whole(&r, config_root_setting(&config));
-    config_destroy(&config);
+    if (image_is(content, size))
+        read_image(&r, content, size);
+    else
+        read_text(&r, content, size);
     free(content);
     return !r.failed;
 }

@@ -1,4 +1,5 @@
-/* rig: reads the configuration of a guard: a text in microns becomes the limits that the core enforces.
+/* rig: reads the configuration of a guard: a text in microns becomes the limits that the core enforces. Compiled ones
+ * (image.h) are read too.
  *
  * Every key is checked; a wrong one is an error with file and line. What only the owner knows has no default. Rounding to
  * quanta is exact and safe: limits inwards, obstacles outwards. (A multiple of 1/64 um is exact in binary, and reading a
@@ -19,7 +20,8 @@ typedef struct {
     char names[DR_OBSTACLES_MAX][RIG_NAME_MAX]; /* of the obstacles; boxes that stand for one cone share its name */
 } rig;
 
-/* Reads a file. False: why[] says "FILE:LINE: what is wrong and what was expected", and *out must not be used. */
+/* Reads a file. False: why[] says "FILE:LINE: what is wrong and what was expected" (a compiled one
+ * has no lines), and *out must not be used. */
 bool rig_read(rig *out, const char *path, char *why, size_t room);
 
 /* At how many points of a grid of RIG_GRID^3 in a drive's box a tip may stand. one: where one of them is; NULL: never mind. */
