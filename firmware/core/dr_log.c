@@ -36,22 +36,28 @@ void dr_log_init(dr_log *log, dr_record *ring, uint16_t size)
     *log = (dr_log){ring, ring == NULL ? (uint16_t)0 : size, 0, 0, 0, 0, 0};
 }
 
-static void drop_oldest(dr_log *log)
+/* A record is chained when it leaves: whoever puts one in must not wait for that. */
+static void chain(dr_log *log, dr_record *oldest) { oldest->crc = log->crc = dr_record_crc(log->crc, oldest); }
+
+static dr_record *drop_oldest(dr_log *log)
 {
+    dr_record *const oldest = &log->ring[log->first];
+    chain(log, oldest);
     log->first = (uint16_t)(log->first + 1u < log->size ? log->first + 1u : 0u);
     log->count--;
+    return oldest;
 }
 
 void dr_log_put(dr_log *log, dr_record *record)
 {
     record->sequence = log->sequence++;
-    record->crc = log->crc = dr_record_crc(log->crc, record);
     if (log->size == 0) {
+        chain(log, record);
         log->missed++;
         return;
     }
     if (log->count == log->size) {
-        drop_oldest(log);
+        (void)drop_oldest(log);
         log->missed++;
     }
     const uint32_t at = (uint32_t)log->first + log->count;
@@ -63,7 +69,6 @@ bool dr_log_take(dr_log *log, dr_record *out)
 {
     if (log->count == 0)
         return false;
-    *out = log->ring[log->first];
-    drop_oldest(log);
+    *out = *drop_oldest(log);
     return true;
 }

@@ -31,14 +31,14 @@ typedef struct {
     dr_record *ring;
     uint16_t size, first, count;
     uint32_t missed;        /* overwritten unread */
-    uint32_t sequence, crc; /* of the next; of the last */
+    uint32_t sequence, crc; /* of the next to be put in; of the last that has left */
 } dr_log;
 
 /* ring NULL or size 0: keeps nothing. */
 void dr_log_init(dr_log *log, dr_record *ring, uint16_t size);
-/* Completes the record (sequence, crc) and keeps it. */
+/* Numbers the record and keeps it. */
 void dr_log_put(dr_log *log, dr_record *record);
-/* The oldest record. False: there is none. */
+/* The oldest record, completed (crc). False: there is none. */
 bool dr_log_take(dr_log *log, dr_record *out);
 
 /* The record as stored or sent: DR_RECORD_BYTES, fields in the order above, little-endian. */
