@@ -1,7 +1,8 @@
 #include "dr_guard_rooms.h"
 
-#define LINE_PAUSE_US MS(35) /* within the 'S' of an MPC-200: 30 ms [M note 10], and some */
-#define LINE_HEAD 2u         /* bytes before that pause: 'S' and the speed */
+#define LINE_KEEPS_US MS(100) /* a frame of 14 bytes takes 2.4 ms; a USB converter's latency is 16 ms */
+#define LINE_PAUSE_US MS(35)  /* within the 'S' of an MPC-200: 30 ms [M note 10], and some */
+#define LINE_HEAD 2u          /* bytes before that pause: 'S' and the speed */
 #define RATE_TOKENS 20u
 #define EVENTS_MAX 16u /* at most so many in one call; a caller who comes that late is due again at once */
 
@@ -53,7 +54,7 @@ static void happen(dr_guard *g, uint8_t timer, dr_us now)
     case DR_TIMER_RELEASE:
         g->stop_latched = false;
         break;
-    default: /* DR_TIMER_STALE has run out: nothing to do */
+    default: /* DR_TIMER_STALE, DR_TIMER_LINE: it is enough that they do not run any more */
         break;
     }
 }
@@ -69,15 +70,37 @@ static bool earliest(const dr_guard *g, uint8_t *timer)
     return any;
 }
 
-static void settle(dr_guard *g, dr_us now)
+static bool is_due(const dr_guard *g, dr_us now)
 {
     uint8_t timer = 0;
+    return earliest(g, &timer) && !dr_us_before(now, g->at[timer]);
+}
+
+/* Every call that may change something is between begin() and end(). */
+static void begin(dr_guard *g, dr_us now)
+{
+    uint8_t timer = 0;
+    dr_g_unseal(g);
     for (uint16_t i = 0; i < EVENTS_MAX && earliest(g, &timer) && !dr_us_before(now, g->at[timer]); i++) {
         const dr_us when = g->at[timer];
         clear_timer(g, timer);
         happen(g, timer, when);
         dr_g_show_state(g, when);
     }
+}
+
+/* Within a frame or a reply the next byte is near, and there is no time to seal between two on a small machine. */
+static bool is_between_bytes(const dr_guard *g)
+{
+    return g->framer.have == 0 && g->out_at == g->out_ready && (g->read_phase != READ_SENT || g->read_have == 0) &&
+           (g->task != TASK_PASS || g->reply_have == 0);
+}
+
+static void end(dr_guard *g, dr_us now)
+{
+    dr_g_show_state(g, now);
+    if (is_between_bytes(g))
+        dr_g_seal(g);
 }
 
 bool dr_guard_is_mid_frame(const dr_guard *g) { return is_leaving(g); }
@@ -93,23 +116,28 @@ bool dr_guard_due(const dr_guard *g, dr_us *when)
 
 void dr_guard_push_host(dr_guard *g, dr_us now, const uint8_t *bytes, size_t count)
 {
-    settle(g, now);
+    begin(g, now);
     for (size_t i = 0; i < count; i++)
         dr_g_push_host_byte(g, now, bytes[i]);
-    dr_g_show_state(g, now);
+    end(g, now);
 }
 
 void dr_guard_push_device(dr_guard *g, dr_us now, const uint8_t *bytes, size_t count)
 {
-    settle(g, now);
+    begin(g, now);
     for (size_t i = 0; i < count; i++)
         dr_g_push_device_byte(g, now, bytes[i]);
-    dr_g_show_state(g, now);
+    if (g->task == TASK_MOVE) /* positions may be streaming */
+        dr_g_show_state(g, now);
+    else
+        end(g, now);
 }
 
 /* The last byte of a frame, or of the guard's own query, is on the wire. */
 static void frame_sent(dr_guard *g, dr_us now)
 {
+    if (g->out_count > 1u)
+        dr_g_set_timer(g, DR_TIMER_LINE, now + LINE_KEEPS_US);
     if (g->task == TASK_SEND) {
         g->task = TASK_MOVE;
         dr_g_set_timer(g, DR_TIMER_TASK, now + dr_g_longest_us(g));
@@ -123,7 +151,9 @@ static void frame_sent(dr_guard *g, dr_us now)
 size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room)
 {
     size_t count = 0;
-    settle(g, now);
+    if (g->stops_out == 0 && g->out_at == g->out_ready && !is_due(g, now)) /* asked often; mostly there is nothing */
+        return 0;
+    begin(g, now);
     while (count < room) { /* at most room times */
         if (g->stops_out > 0 && !is_leaving(g)) {
             g->stops_out--;
@@ -138,57 +168,65 @@ size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room)
             break;
         }
     }
-    dr_g_show_state(g, now);
+    end(g, now);
     return count;
 }
 
 size_t dr_guard_pull_host(dr_guard *g, dr_us now, uint8_t *bytes, size_t room)
 {
     size_t count = 0;
-    settle(g, now);
+    if (g->to_host_count == 0 && !is_due(g, now))
+        return 0;
+    begin(g, now);
     while (count < room && g->to_host_count > 0) { /* at most room times */
         bytes[count++] = g->to_host[g->to_host_first];
         g->to_host_first = (uint8_t)((g->to_host_first + 1u) % DR_HOST_OUT_MAX);
         g->to_host_count--;
     }
+    end(g, now);
     return count;
 }
 
 void dr_guard_input(dr_guard *g, dr_us now, dr_input what, bool on)
 {
-    settle(g, now);
-    if (what >= DR_INPUTS || is_on(g, what) == on)
-        return;
-    g->inputs = (uint16_t)(g->inputs ^ 1u << what);
-    dr_g_log_event(g, now, DR_EVENT_INPUT, (uint8_t)what, on);
-    dr_g_input_changed(g, now, what, on);
-    dr_g_show_state(g, now);
+    begin(g, now);
+    if (what < DR_INPUTS && is_on(g, what) != on) {
+        g->inputs = (uint16_t)(g->inputs ^ 1u << what);
+        dr_g_log_event(g, now, DR_EVENT_INPUT, (uint8_t)what, on);
+        dr_g_input_changed(g, now, what, on);
+    }
+    end(g, now);
 }
 
 void dr_guard_link(dr_guard *g, dr_us now, bool host_open, bool device_present)
 {
-    settle(g, now);
+    begin(g, now);
     dr_g_link(g, now, host_open, device_present);
-    dr_g_show_state(g, now);
+    end(g, now);
 }
 
 void dr_guard_host_line_error(dr_guard *g, dr_us now)
 {
-    settle(g, now);
+    begin(g, now);
     dr_g_drop_frame(g, now);
+    end(g, now);
 }
 
 bool dr_guard_self_check(dr_guard *g, dr_us now)
 {
-    settle(g, now);
+    begin(g, now);
     if (g->limits != NULL && !dr_g_is_intact(g))
         dr_g_fall_back(g, now);
-    dr_g_show_state(g, now);
+    end(g, now);
     return g->limits != NULL;
 }
 
 void dr_guard_get_status(const dr_guard *g, dr_guard_status *out)
 {
+    if (dr_g_is_damaged(g)) { /* the next call makes it so */
+        *out = (dr_guard_status){.state = DR_GUARD_LOCKED, .fault = DR_FAULT_DAMAGED, .needs = DR_NEEDS_LIMITS};
+        return;
+    }
     *out = (dr_guard_status){.state = (uint8_t)dr_g_state_of(g), .fault = g->fault, .needs = dr_g_needs_of(g)};
     if (g->limits != NULL) {
         const bool outside = g->position_known &&
@@ -219,7 +257,17 @@ void dr_guard_get_status(const dr_guard *g, dr_guard_status *out)
     out->log_missed = g->log.missed;
 }
 
-bool dr_guard_pull_log(dr_guard *g, dr_record *out) { return dr_log_take(&g->log, out); }
+bool dr_guard_pull_log(dr_guard *g, dr_record *out)
+{
+    const bool was_sealed = g->sealed;
+    if (g->log.count == 0)
+        return false;
+    dr_g_unseal(g);
+    const bool taken = dr_log_take(&g->log, out);
+    if (was_sealed)
+        dr_g_seal(g);
+    return taken;
+}
 
 void dr_guard_init(dr_guard *g, const dr_limits *limits, dr_record *ring, uint16_t size)
 {

@@ -56,7 +56,8 @@ typedef enum {
     DR_FAULT_UNSTOPPABLE,      /* a stop was asked for and the tip could not be proved at rest in 1 s */
     DR_FAULT_FRAME_LOST,       /* a calibration was broken off: only a calibration may move anything */
     DR_FAULT_STOP_WIRING,      /* the two stop contacts disagree for more than 50 ms */
-    DR_FAULT_DAMAGED,          /* limits or state in memory are not what they were: restart the guard */
+    DR_FAULT_DAMAGED, /* limits or state in memory are not what they were (a flipped bit): restart the guard. Where it was the
+                       * state, the log is no more */
     DR_FAULT_TORN, /* locks: the cable went within a frame, whose rest the controller takes from any byte that
                                 * comes: cycle its power, then CONFIRM */
     DR_FAULTS
@@ -156,6 +157,7 @@ enum {
     DR_TIMER_STALE,   /* a knob may have gone anywhere since the last reading */
     DR_TIMER_WIRING,  /* the stop contacts disagree */
     DR_TIMER_RELEASE, /* the stop contacts have stopped bouncing */
+    DR_TIMER_LINE,    /* what left last is off the line, whatever converters kept */
     DR_TIMERS
 };
 
@@ -166,15 +168,16 @@ typedef struct {
     const dr_limits *limits; /* NULL: none, or no longer trusted */
     uint32_t limits_crc;
     dr_log log;
-    uint8_t mode, mode_inverse; /* kept twice: a flipped bit must not arm */
-    uint8_t fault, shown_state;
+    uint8_t mode, fault, shown_state;
     uint16_t inputs; /* bit per dr_input */
     bool host_open, device_present;
-    bool plugged, torn;  /* the device's cable, while it counts as not present: half a frame is in the controller */
+    bool plugged;        /* the device's cable, while it counts as not present */
+    uint8_t torn;        /* half a frame is in the controller (no bool: it is looked at after damage, too) */
     bool after_reset;    /* a ^C goes first when the device is there */
     bool proved;         /* it is the controller of the limits */
     bool other_firmware; /* it said so itself */
     bool ambiguous;      /* it may be: CONFIRM decides */
+    bool host_chose;     /* a drive, by 'I' */
     bool confirmed, tip_changed, unsteady, wiring_alarm, stop_latched, cut, buzzer;
 
     dr_us at[DR_TIMERS];
@@ -223,6 +226,9 @@ typedef struct {
     uint8_t last_op;
     dr_verdict last_refusal;
     uint32_t forwarded, refused, dropped_bytes, quarantined_bytes;
+
+    uint32_t seal; /* over all of the above, while nothing is arriving or leaving */
+    uint8_t sealed;
 } dr_guard;
 
 /* A guard of these limits, which stay the caller's and must not change; NULL or limits that dr_limits_check() refuses:

@@ -134,8 +134,10 @@ static void learn(dr_guard *g, dr_us now)
         break;
     case DR_OP_MPC_SELECT:
         if (dr_wire_get_reply(&g->command, g->reply, g->command.reply, &reply) &&
-            (g->command.reply == 1u || reply.value == g->request.value))
+            (g->command.reply == 1u || reply.value == g->request.value)) {
             g->scene.chosen = (uint8_t)(g->request.value - 1u);
+            g->host_chose = true;
+        }
         break;
     case DR_OP_MPC_ACTIVE:
         if (dr_wire_get_reply(&g->command, g->reply, g->command.reply, &reply) && g->command.reply > 2u &&

@@ -95,8 +95,8 @@ void dr_g_read_for_end(dr_guard *g, dr_us now, const dr_reply *reply)
     if (is_at_an_end(g, reply)) {
         dr_g_know_place(g, now, reply);
         dr_g_end_task(g);
-        for (uint8_t drive = 0; drive < DR_PORTS; drive++)
-            g->scene.old[drive].is_open = false;
+        for (uint8_t drive = 0; drive < DR_PORTS; drive++) /* what had no CR may have been ignored */
+            g->scene.old[drive].is_open = g->scene.old[drive].is_open && !g->end_told;
         if (is_calibration(g->command.op))
             g->scene.frame_lost = false;
         if (g->end_told)

@@ -13,7 +13,7 @@ static void lose_device(dr_guard *g)
     if (moved)
         dr_g_break_off_unproved(g);
     dr_g_end_task(g);
-    g->torn = is_leaving(g);
+    g->torn = is_leaving(g) || is_running(g, DR_TIMER_LINE);
     g->out_at = g->out_count = g->out_ready = g->stops_out = 0;
     clear_timer(g, DR_TIMER_SEND);
     g->position_known = false;
@@ -22,9 +22,13 @@ static void lose_device(dr_guard *g)
 
 static void lose_host(dr_guard *g, dr_us now)
 {
+    const bool at_rest = g->task == TASK_NONE || g->task == TASK_PASS;
     dr_framer_reset(&g->framer);
     clear_timer(g, DR_TIMER_FRAME);
     g->to_host_count = 0;
+    g->host_chose = false;
+    if (at_rest && has_rig(g, DR_RIG_STAYS_ARMED))
+        return;
     if (g->limits->host_loss == DR_HOST_LOSS_FINISH && g->task != TASK_CHECK && g->mode == MODE_ARMED)
         dr_g_set_mode(g, MODE_DISARMED);
     else
@@ -140,9 +144,14 @@ void dr_g_read_for_arming(dr_guard *g, dr_us now, const dr_reply *reply)
     dr_g_end_task(g);
     g->unsteady = !agree;
     const dr_verdict place = dr_judge_place(g->limits, g->scene.drive, reply->steps);
+    if (!dr_g_is_intact(g)) {
+        dr_g_fall_back(g, now);
+        return;
+    }
     if (!agree || (place.reason != DR_REASON_NONE && !is_on(g, DR_INPUT_ESCAPE)))
         return;
-    g->scene.chosen = g->scene.drive;
+    if (!g->host_chose)
+        g->scene.chosen = g->scene.drive;
     dr_g_set_mode(g, MODE_ARMED);
     dr_g_start_idling(g, now);
 }

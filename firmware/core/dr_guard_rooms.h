@@ -4,6 +4,7 @@
  * list and never those below; tests/core_rules has the order from CMakeLists.txt.
  *
  *     dr_guard_state     who may do what now, timers, and the log of it
+ *     dr_guard_seal      has memory kept what it was given?
  *     dr_guard_out       what goes out: bytes for the host, refusals, frames, queries and ^C for the controller
  *     dr_guard_place     who the controller is, and where its tip is
  *     dr_guard_stop      faults, stops, and the proof of rest
@@ -87,6 +88,12 @@ void dr_g_log_bytes(dr_guard *g, dr_us now, dr_event event, uint8_t code, uint8_
                     uint8_t count);
 void dr_g_log_event(dr_guard *g, dr_us now, dr_event event, uint8_t code, uint8_t item);
 void dr_g_show_state(dr_guard *g, dr_us now);
+
+/* -- dr_guard_seal: with or without limits -------------------------------------------------------------------------- */
+
+void dr_g_seal(dr_guard *g);
+bool dr_g_is_damaged(const dr_guard *g);
+void dr_g_unseal(dr_guard *g); /* before anything is changed; on damage an empty guard, LOCKED, is left */
 
 /* -- dr_guard_out ------------------------------------------------------------------------------------------------------ */
 

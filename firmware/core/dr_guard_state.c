@@ -10,7 +10,6 @@ void dr_g_set_timer(dr_guard *g, uint8_t timer, dr_us when)
 void dr_g_set_mode(dr_guard *g, dr_mode mode)
 {
     g->mode = (uint8_t)mode;
-    g->mode_inverse = (uint8_t)~g->mode;
     if (mode != MODE_ARMED)
         clear_timer(g, DR_TIMER_IDLE);
 }

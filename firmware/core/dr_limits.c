@@ -248,7 +248,8 @@ bool dr_limits_init_drive(dr_limits *limits, uint8_t drive, dr_stage_id id)
 #define FOR_TRIO_ONLY (DR_RIG_Y_LOCKED_OUT | DR_RIG_CALIBRATES_AT_POWER_ON)
 #define Y_LOCKED_OUT_OF_ANY (DR_RIG_Y_LOCKED_OUT * ((1u << DR_PORTS) - 1u))
 #define FOR_MPC_ONLY (DR_RIG_HOME_IS_ZERO | DR_RIG_MAY_STREAM | Y_LOCKED_OUT_OF_ANY)
-#define FOR_BOTH (DR_RIG_KNOBS_LOCKED | DR_RIG_PATHS_UNKNOWN | DR_RIG_MAY_CALIBRATE | DR_RIG_HAS_CUT)
+#define FOR_BOTH                                                                                                       \
+    (DR_RIG_KNOBS_LOCKED | DR_RIG_PATHS_UNKNOWN | DR_RIG_MAY_CALIBRATE | DR_RIG_HAS_CUT | DR_RIG_STAYS_ARMED)
 #define MODE_LAST 9u /* [M table 9, 'L'] */
 
 #define OFFSET_FAR ((int64_t)DR_AXES * DR_NORMAL_MAX * DR_FAR_Q)

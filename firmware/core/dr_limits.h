@@ -64,6 +64,7 @@ enum {
     DR_RIG_MAY_CALIBRATE = 1u << 5,          /* 'R' and 'N', while a person allows it */
     DR_RIG_MAY_STREAM = 1u << 6,             /* 'O' */
     DR_RIG_HAS_CUT = 1u << 7,                /* a relay in the controller's supply */
+    DR_RIG_STAYS_ARMED = 1u << 12,           /* when the host closes its port at rest, for arm_idle_s at most */
     /* Y may stay out of homing: external switch 5 of a TRIO [T table 1] is OFF, or switch 8 of an MPC-200's first drive
      * [M table 3]; << drive for its other drives. */
     DR_RIG_Y_LOCKED_OUT = 1u << 8

@@ -31,7 +31,8 @@ struct bench {
     uint32_t clock_at_start; /* what the guard's clock showed then */
     uint32_t byte_us;
 
-    bool by_hand;                         /* the test is the controller: device_says(), wire[] */
+    bool is_damaged; /* the test has flipped a bit of the guard's memory: no M4, its counts are gone */
+    bool by_hand;    /* the test is the controller: device_says(), wire[] */
     int (*spoil)(bench *b, uint8_t byte); /* what arrives instead of a byte that the controller sends; -1: nothing */
     uint32_t said;                        /* bytes that the controller has sent so far */
 

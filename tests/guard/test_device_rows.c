@@ -399,6 +399,7 @@ static void row_48_ctrl_c_that_is_ignored(void)
     fake_rig();
     rig.limits.rig |= DR_RIG_HAS_CUT;
     rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+    rig.guard.sealed = false;
     fake.ignores_stop = true;
     fake.lasts = 5000000;
     fake_move(100);
@@ -427,6 +428,7 @@ static void a_rig_that_calibrates_at_power_on_gets_its_power_back_when_a_person_
     fake_rig();
     rig.limits.rig |= DR_RIG_HAS_CUT | DR_RIG_CALIBRATES_AT_POWER_ON;
     rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+    rig.guard.sealed = false;
     fake.ignores_stop = true;
     fake.lasts = 3000000;
     fake_move(100);
@@ -486,6 +488,7 @@ static void row_49_the_old_target_is_kept_until_a_motion_has_ended_at_its_own(vo
     run_ms(600);
     expect_cr();
     rig.guard.scene.old[0].target_q = (dr_box){{UM(6000), UM(5000), UM(5000)}, {UM(6000), UM(5000), UM(5000)}};
+    rig.guard.sealed = false;
     host_line(15, 80000, 80000, 80000);
     run_ms(1000);
     expect_refused(DR_REASON_OLD_TARGET);
@@ -613,7 +616,7 @@ static void row_54_unplugged_and_plugged_in_again(void)
 {
     bench_armed_trio();
     host_line(0, 42000, 40000, 40000);
-    run_ms(100);
+    run_ms(150);
     dr_guard_link(&rig.guard, (dr_us)(rig.clock_at_start + rig.now), true, false);
     run_ms(10);
     expect_state(DR_GUARD_LOCKED);
@@ -722,6 +725,7 @@ static void row_55_a_knob_is_no_faster_than_a_knob(void)
         fake_rig();
         rig.limits.rig = 0; /* 5 mm/s: 40 microsteps a ms */
         rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+        rig.guard.sealed = false;
         host_code('c');
         fake_ms(10);
         fake_ms(turns[i].after_ms - 10);

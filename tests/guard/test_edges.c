@@ -752,8 +752,10 @@ static void a_cut_needs_its_confirmation_after_the_fault_is_cleared(void)
     by_hand_moving();
     rig.limits.rig |= DR_RIG_HAS_CUT | DR_RIG_CALIBRATES_AT_POWER_ON;
     rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+    rig.guard.sealed = false;
     keep_out(20000, 20001, 20000, 20001, 20000, 20001);
     rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+    rig.guard.sealed = false;
     host_code(3);
     run_ms(1200);
     expect_fault(DR_FAULT_UNSTOPPABLE);
@@ -775,6 +777,7 @@ static void a_wiring_alarm_outlives_the_key(void)
     input(DR_INPUT_STOP, true);
     run_ms(600);
     rig.guard.stop_latched = false;
+    rig.guard.sealed = false;
     clear_fault();
     expect_state(DR_GUARD_FAULT);
 }
@@ -789,9 +792,142 @@ static void codes_beside_the_axes(void)
     TEST_ASSERT_EQUAL(DR_REASON_NONE, dr_judge_frame(&rig.limits, &command, &request).reason);
 }
 
+/* A move that was too short for the controller to notice has not taken the place of the one that ^C broke off. */
+static void an_ignored_move_forgets_no_old_target(void)
+{
+    bench_mpc();
+    rig.controller.quirks = DR_QUIRK_SMALL_MOVE_SILENT;
+    bench_start();
+    bench_arm();
+    host_line(4, 96000, 80000, 80000);
+    run_ms(200);
+    host_code(3);
+    run_ms(600);
+    expect_cr();
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open);
+    uint32_t at[DR_AXES];
+    dr_controller_position(&rig.controller, 0, guard_clock(), at);
+    host_point('M', at[0] + 8, at[1], at[2]);
+    run_ms(600);
+    expect_state(DR_GUARD_IDLE);
+    expect_silence();
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open);
+    host_point('M', at[0] + 80, at[1], at[2]);
+    run_ms(600);
+    expect_cr();
+    TEST_ASSERT_FALSE(rig.guard.scene.old[0].is_open);
+}
+
+/* The drive of a motion is the one that the host chose, before ARM was pressed too. */
+static void the_hosts_choice_of_a_drive_outlives_arming(void)
+{
+    bench_mpc();
+    bench_start();
+    host_value('I', 2);
+    run_ms(10);
+    expect_heard("\2\r", 2);
+    rig.controller.active = 0; /* MANIPULATOR */
+    bench_arm();
+    host_point('M', 81000, 80000, 80000);
+    run_ms(100);
+    expect_refused(DR_REASON_DRIVE);
+    expect_tip(0, 80000, 80000, 80000);
+
+    cables(false, true); /* another host, which has chosen nothing: the drive that is active when ARM is pressed */
+    cables(true, true);
+    press(DR_INPUT_ARM);
+    run_ms(150);
+    host_point('M', 81000, 80000, 80000);
+    run_ms(300);
+    expect_cr();
+    expect_tip(0, 81000, 80000, 80000);
+}
+
+/* The guard has given the last byte away, the converter has not: as much of the frame may be lost with the cable. */
+static void a_cable_pulled_right_behind_a_frame_may_have_torn_it(void)
+{
+    for (unsigned ms = 0; ms < 120; ms++) {
+        bench_armed_trio();
+        host_line(0, 41600, 40000, 40000);
+        while (rig.motions == 0)
+            run_us(100);
+        run_ms(ms);
+        cables(true, false);
+        if (ms <= 99)
+            expect_fault(DR_FAULT_TORN);
+        if (ms >= 101)
+            expect_fault(DR_FAULT_NO_DEVICE);
+        expect_state(DR_GUARD_LOCKED);
+    }
+    bench_armed_trio(); /* what is one byte long cannot be torn */
+    host_code('c');
+    run_us(300);
+    cables(true, false);
+    expect_fault(DR_FAULT_NO_DEVICE);
+}
+
+static void damaged_limits_are_not_armed(void)
+{
+    bench_trio();
+    bench_start();
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    rig.limits.margin_q++;
+    run_ms(150);
+    expect_state(DR_GUARD_LOCKED);
+    expect_fault(DR_FAULT_DAMAGED);
+}
+
+/* Where it was asked for: who closes the port at rest finds the guard armed when it comes back, for arm_idle_s at most. */
+static void a_rig_may_stay_armed_between_two_hosts(void)
+{
+    bench_trio();
+    rig.limits.rig |= DR_RIG_STAYS_ARMED;
+    rig.limits.arm_idle_s = 10;
+    bench_start();
+    bench_arm();
+    host_line(15, 40800, 40000, 40000);
+    run_ms(200);
+    expect_cr();
+    cables(false, true);
+    expect_state(DR_GUARD_IDLE);
+    run_ms(5000);
+    cables(true, true);
+    host_line(15, 40000, 40000, 40000);
+    run_ms(200);
+    expect_cr();
+    cables(false, true);
+    run_ms(10100);
+    expect_state(DR_GUARD_DISARMED);
+
+    press(DR_INPUT_ARM); /* a host that is lost in mid-move is another matter */
+    run_ms(150);
+    cables(true, true);
+    host_line(0, 44000, 40000, 40000);
+    run_ms(100);
+    cables(false, true);
+    expect_state(DR_GUARD_STOPPING);
+    run_ms(600);
+    expect_state(DR_GUARD_DISARMED);
+    press(DR_INPUT_ARM);
+    run_ms(150);
+    cables(true, true);
+    host_axis('x', 41600);
+    run_ms(20);
+    expect_state(DR_GUARD_MOVING_U);
+    cables(false, true);
+    run_ms(600);
+    expect_state(DR_GUARD_DISARMED);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(an_ignored_move_forgets_no_old_target);
+    RUN_TEST(the_hosts_choice_of_a_drive_outlives_arming);
+    RUN_TEST(a_cable_pulled_right_behind_a_frame_may_have_torn_it);
+    RUN_TEST(damaged_limits_are_not_armed);
+    RUN_TEST(a_rig_may_stay_armed_between_two_hosts);
     RUN_TEST(a_stop_during_a_hosts_query);
     RUN_TEST(a_controller_that_answers_ctrl_c_and_moves_on);
     RUN_TEST(a_stop_with_the_end_already_reached_leaves_no_old_target);

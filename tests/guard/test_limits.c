@@ -120,7 +120,7 @@ static void row_71_nonsense_in_the_head(void)
     good.firmware = 0x0099, expect(DR_LIMITS_FIRMWARE, 0, DR_AXES);
     good.rig = DR_RIG_CALIBRATES_AT_POWER_ON, expect(DR_LIMITS_RIG, 0, DR_AXES);
     good.rig = 0x0001, expect(DR_LIMITS_RIG, 0, DR_AXES);
-    good.rig = 0x1000, expect(DR_LIMITS_RIG, 0, DR_AXES);
+    good.rig = 0x2000, expect(DR_LIMITS_RIG, 0, DR_AXES);
     for (unsigned drive = 0; drive < DR_PORTS; drive++) /* switch 8 of each drive */
         good.rig = (uint16_t)(DR_RIG_Y_LOCKED_OUT << drive), expect(DR_LIMITS_GOOD, 0, DR_AXES);
     good.rig = DR_RIG_MAY_STREAM | DR_RIG_HOME_IS_ZERO | DR_RIG_HAS_CUT, expect(DR_LIMITS_GOOD, 0, DR_AXES);

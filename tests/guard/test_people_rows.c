@@ -489,7 +489,7 @@ static void row_72_a_flipped_bit_of_the_mode_is_found(void)
 {
     for (unsigned bit = 0; bit < 8; bit++) {
         bench_armed_trio();
-        rig.guard.mode_inverse ^= (uint8_t)(1u << bit);
+        rig.guard.mode ^= (uint8_t)(1u << bit);
         host_line(15, 40800, 40000, 40000);
         run_ms(100);
         expect_state(DR_GUARD_LOCKED);
