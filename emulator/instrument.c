@@ -84,6 +84,7 @@ static size_t finish_byte(instrument *ins, uint8_t *bytes, size_t room)
 {
     const uint8_t sent = ins->sending;
     size_t count = 1;
+    ins->sent = sent;
     ins->sending = INSTRUMENT_NOTHING;
     ins->said_i = sent == INSTRUMENT_LETTER_I && !dr_controller_answers_stop(&ins->controller);
     switch (sent) {

@@ -60,6 +60,7 @@ typedef struct {
     instrument_line to_host, from_host;
     uint64_t held_until_us; /* a fault delays what is to be sent; UINT64_MAX: for good */
     uint8_t sending;        /* instrument_sending: what the line to the host carries now */
+    uint8_t sent;           /* ... and has carried last */
     bool said_i;            /* the 'I' of this ^C has left */
     uint64_t beat_us;       /* the last heartbeat */
     struct {

@@ -300,7 +300,7 @@ static bool open_record(program *p)
 
 static bool open_report(const char *option, const char *path, FILE **file)
 {
-    if (path == NULL || (*file = fopen(path, "we")) != NULL)
+    if (path == NULL || (*file = recording_file(path)) != NULL)
         return true;
     (void)fprintf(stderr, "dryrig-emu: --%s %s: %s\n", option, path, strerror(errno));
     return false;

@@ -2,6 +2,7 @@
 #include "trace.h"
 
 #include "observe_json.h" /* for programs */
+#include "recording.h"    /* a file that may be a pipe */
 
 #include "dr_words.h" /* dr_words_note */
 
@@ -21,7 +22,7 @@ bool trace_open(trace *t, const char *path, bool has_names)
     t->base.see = see;
     const bool to_stderr = strcmp(path, "-") == 0;
     t->path = to_stderr ? "stderr" : path;
-    t->file = to_stderr ? stderr : fopen(path, "we");
+    t->file = to_stderr ? stderr : recording_file(path);
     if (t->file == NULL)
         return false;
     (void)setvbuf(t->file, NULL, _IOLBF, BUFSIZ);
@@ -115,12 +116,16 @@ static void tell_note(trace *t, const observation *seen)
     char direction = '-';
     size_t at = 0, skip = 0;
     const char *changed = "";
+    const bool is_stop = t->stopped == ins; /* by hand, and this is the CR of the move that it ended */
+    const bool stops = note->what == DR_NOTE_HAND && note->value == DR_EFFECT_STOP;
+    t->stopped = stops || (is_stop && note->what == DR_NOTE_STOPPED) ? ins : NULL;
     if (note->what == DR_NOTE_REQUEST || note->what == DR_NOTE_FILLER || note->what == DR_NOTE_UNKNOWN) {
         direction = '>';
     } else if (note->what == DR_NOTE_REPLY) {
         direction = '<';
-        if ((ins->quirks & INSTRUMENT_STOP_SAYS_I) != 0 && is_interrupt) {
-            at = add_hex(hex, at, (const uint8_t *)"I", 1);
+        if ((ins->quirks & INSTRUMENT_STOP_SAYS_I) != 0 && (is_interrupt || is_stop)) {
+            at = add_hex(hex, at, (const uint8_t *)"I", 1); /* before the CR, or in its place */
+            skip = is_stop ? 1 : 0;
             changed = " (quirk stop-says-i)";
         } else if ((ins->quirks & INSTRUMENT_POSITION_13) != 0 && note->op == DR_OP_MPC_POSITION) {
             skip = 1;
@@ -183,9 +188,14 @@ static void see(observer *o, const observation *seen)
         tell_streamed(t);
         tell(t, seen->name, seen->when_us, '-', "", seen->text);
         break;
-    case OBSERVED_FROM_HOST: /* the notes tell what they mean */
     case OBSERVED_TO_HOST:
-    case OBSERVED_LOST:
+    case OBSERVED_LOST: /* a NUL is no answer, so there is no note of it */
+        if (seen->ins->sent != INSTRUMENT_NUL)
+            break;
+        tell_streamed(t);
+        tell(t, seen->name, seen->when_us, '<', "00", "NUL during a move (quirk nul-heartbeat)");
+        break;
+    case OBSERVED_FROM_HOST: /* the notes tell what they mean */
     case OBSERVED_TTY:
     case OBSERVED_END:
         break;

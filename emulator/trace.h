@@ -25,7 +25,8 @@ typedef struct {
     const instrument *streaming; /* whose they are */
     const char *streaming_name;
     uint32_t streamed_count;
-    uint32_t lost; /* lines that nobody took, since one was */
+    const instrument *stopped; /* STOP on its ROE has just ended a move */
+    uint32_t lost;             /* lines that nobody took, since one was */
 } trace;
 
 /* Opens a file, or stderr where path is "-"; one whose name ends in .jsonl gets JSON lines. False: errno says why. */

@@ -1,9 +1,11 @@
+#define _POSIX_C_SOURCE 200809L /* open, fdopen */
 #include "record.h"
 
 #include "dr_recording.h" /* the format */
 #include "dr_words.h"     /* firmware as text */
 
 #include <errno.h>
+#include <fcntl.h>
 #include <string.h>
 
 /* What cannot be written is said once; the controller is more important. */
@@ -81,14 +83,24 @@ static bool introduce(const record *r, const command_line *line)
     return done;
 }
 
+/* A pipe without a reader is refused: opening it would wait for one, with the controller. */
+static FILE *open_file(const char *path)
+{
+    const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_NONBLOCK | O_CLOEXEC, 0666);
+    if (fd >= 0)
+        (void)fcntl(fd, F_SETFL, O_WRONLY);
+    return fd < 0 ? NULL : fdopen(fd, "w");
+}
+
 int record_open(record *r, const command_line *line, dryrig_link *out, char *why, size_t room)
 {
     memset(r, 0, sizeof *r);
     r->path = line->record;
     r->name = line->open.controller == DRYRIG_TRIO ? "trio" : "mpc";
-    r->file = fopen(r->path, "w");
+    r->file = open_file(r->path);
     if (r->file == NULL || !introduce(r, line)) {
-        (void)snprintf(why, room, "--record %s: %s", r->path, strerror(errno));
+        (void)snprintf(why, room, "--record %s: %s", r->path,
+                       errno == ENXIO ? "nobody reads this pipe; start its reader first" : strerror(errno));
         if (r->file != NULL)
             (void)fclose(r->file);
         return DRYRIG_ERR_ARGUMENT;

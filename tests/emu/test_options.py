@@ -180,15 +180,45 @@ class Trace(unittest.TestCase):
             with self.subTest(name), emu.directory() as d:
                 path = os.path.join(d, name)
                 os.mkfifo(path)
-                reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-                self.addCleanup(os.close, reader)
-                with Emulator("mpc", "--trace", path, "--pace", "off") as e, Port(e.path) as port:
+                with Emulator("mpc", "--trace", path, "--pace", "off") as e, Port(e.path) as port:  # begins without a reader
+                    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+                    self.addCleanup(os.close, reader)
                     for _ in range(2000):  # 140 kB of trace and more; a pipe takes 64
                         self.assertEqual(port.ask(b"K", 4), emu.ACTIVE[1])
                     while select.select([reader], [], [], 0)[0]:
                         os.read(reader, 65536)
                     self.assertEqual(port.ask(b"K", 4), emu.ACTIVE[1])
                     self.assertRegex(os.read(reader, 65536), told)
+
+    def test_a_report_into_a_pipe_waits_for_nobody_at_the_start(self):
+        with emu.directory() as d:
+            path = os.path.join(d, "lint.json")
+            os.mkfifo(path)
+            with Emulator("mpc", "--lint-json", path):
+                reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+                self.addCleanup(os.close, reader)
+            self.assertIn(b'"findings"', os.read(reader, 65536))
+
+    def test_the_trace_shows_what_goes_over_the_wire(self):
+        with emu.directory() as d:
+            path, socket = os.path.join(d, "trace"), os.path.join(d, "control")
+            with Emulator("mpc", "--clock", "jump", "--quirks", "nul-heartbeat,stop-says-i,position-13", "--trace", path,
+                          "--control", socket, "--do", "in 120ms press stop") as e, Port(e.path) as port:
+                self.assertEqual(port.ask(b"C", 13)[-1:], b"\r")
+                self.assertEqual(port.ask(b"\x03", 2), b"I\r")
+                self.assertEqual(port.ask(b"M" + emu.point(48000, 0, 0), 2), b"\0I")  # a NUL at 100 ms, STOP at 120
+                self.assertEqual(port.ask(b"K", 4), emu.ACTIVE[1])
+                self.assertEqual(port.ask(b"M" + emu.point(16, 0, 0), 120)[-1:], b"\r")
+            with open(path, encoding="ascii") as file:
+                lines = [line.split(maxsplit=2) for line in file]
+        self.assertIn("been on for a while", " ".join(lines[0]))
+        sent = [words[2] for words in lines if words[1] == "<"]
+        self.assertTrue(sent[0].startswith("00 00 00"), sent)
+        self.assertTrue(sent[1].startswith("49 0D "), sent)
+        self.assertTrue(sent[2].startswith("00  "), sent)
+        self.assertTrue(sent[3].startswith("49  "), sent)
+        self.assertTrue(sent[4].startswith("01 21 03 0D "), sent)
+        self.assertTrue(sent[-1].startswith("0D "), sent)
 
     def test_a_trace_that_cannot_be_begun_is_an_error(self):
         status, out, error = outcome("mpc", "--trace", "/no/such/directory/trace")

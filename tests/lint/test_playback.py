@@ -264,6 +264,16 @@ class Pipes(unittest.TestCase):
             self.assertRegex(err, r"pipe is incomplete: nobody took its last \d+ lines")
 
 
+    def test_dryrig_does_not_wait_for_a_reader_with_a_controller_in_its_hand(self):
+        with tempfile.TemporaryDirectory() as where:
+            pipe = os.path.join(where, "pipe")
+            os.mkfifo(pipe)
+            words = [DRYRIG, "--port", "/dev/null", "--controller", "mpc", "--record", pipe, "info"]
+            done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, timeout=LIMIT_S, check=False)
+            self.assertEqual((2, b""), (done.returncode, done.stdout))
+            self.assertIn(b"nobody reads this pipe", done.stderr)
+
+
 class Small(unittest.TestCase):
     def test_a_wedge_is_told_once(self):
         program = Program("mpc", "--quirks", "s-needs-pause")

@@ -11,13 +11,19 @@
 #include <string.h>
 #include <sys/stat.h>
 
+FILE *recording_file(const char *path)
+{
+    struct stat is;
+    const bool is_pipe = stat(path, &is) == 0 && S_ISFIFO(is.st_mode);
+    const int pipe_fd = is_pipe ? open(path, O_RDWR | O_CLOEXEC) : -1; /* to write alone would wait for a reader */
+    return !is_pipe ? fopen(path, "we") : pipe_fd < 0 ? NULL : fdopen(pipe_fd, "w");
+}
+
 bool recording_open(recording *r, const char *program, const char *path)
 {
     struct stat is;
     *r = (recording){.program = program, .path = path};
-    const bool is_pipe = stat(path, &is) == 0 && S_ISFIFO(is.st_mode);
-    const int pipe_fd = is_pipe ? open(path, O_RDWR | O_CLOEXEC) : -1; /* to write alone would wait for a reader */
-    r->file = is_pipe ? (pipe_fd < 0 ? NULL : fdopen(pipe_fd, "w")) : fopen(path, "we");
+    r->file = recording_file(path);
     if (r->file == NULL)
         return false;
     r->is_file = fstat(fileno(r->file), &is) == 0 && S_ISREG(is.st_mode);

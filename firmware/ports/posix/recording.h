@@ -19,6 +19,9 @@ typedef struct {
     bool told_loss;
 } recording;
 
+/* A file to be written. A pipe may wait for its reader. NULL: errno says why. */
+FILE *recording_file(const char *path);
+
 /* Both texts stay the caller's. A pipe may wait for its reader. False: errno says why. */
 bool recording_open(recording *r, const char *program, const char *path);
 /* What was lost at the end is told. */
