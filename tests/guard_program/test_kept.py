@@ -107,5 +107,75 @@ class Recording(unittest.TestCase):
         self.replays("3 lines of events are told in the recording, not played")
 
 
+class Replaying(unittest.TestCase):
+    """A log is enough to replay what happened on the controller's line."""
+
+    def told(self, g):
+        path = os.path.join(os.path.dirname(g.log), "log.rec")
+        status, out, err = guard.run("log", g.log, "--config", g.config, "--record", path)
+        self.assertEqual((status, out, err), (0, "", ""))
+        status, out, err = run("DRYRIG_EMU", "replay", path)
+        self.assertEqual((status, err), (0, ""), out + read(path))
+        return read(path), out
+
+    def test_an_mpc(self):
+        with guarded("mpc", rig(guard.MPC, high=2000), "--position", "1100um,50um,7um") as (_, g, port):
+            for question, count in ((b"C", 14), (b"K", 4), (b"U", 6), (b"L\x03", 1), (move_mpc(1100, 60, 7), 1),
+                                    (line(15, 1150, 60, 7), 1), (b"\x03", 1), (b"I\x01", 2), (b"C", 14)):
+                self.assertEqual(len(port.ask(question, count)), count)
+            port.send(move_mpc(2001, 0, 0))
+            emu.wait_until(lambda: g.status()["refused"] == 1, "the refusal")
+            g.stop()
+            text, out = self.told(g)
+        self.assertRegex(out, r"mpc: 0 of \d\d answers differ")
+        self.assertRegex(text, r" mpc - refused: host 4D 10 7D 00 00 .*; limit on axis X\n")
+
+    def test_a_trio_twice(self):
+        with emu.directory() as directory, emu.Emulator("trio", "--angle", "60") as e:
+            with Guard(directory, e.path, rig(guard.TRIO)) as g:
+                for _ in range(2):
+                    with emu.Port(g.path) as port:
+                        g.arm()
+                        for question, count in ((b"x" + POINT(12000, 0, 0)[:4], 1), (b"A\x2d", 1),
+                                                (b"W" + POINT(11800, 10600, 10100), 1), (b"C", 14)):
+                            self.assertEqual(len(port.ask(question, count)), count)
+                    g.stop()
+                    text, out = self.told(g)
+                    g.start()
+                g.stop()
+                text, out = self.told(g)
+        self.assertRegex(out, r"trio: 0 of \d\d answers differ")
+        self.assertRegex(out, r"trio\.2: 0 of \d\d answers differ")
+        self.assertRegex(out, r"trio\.3: 0 of \d answers differ")
+        self.assertIn("set trio.2 device MP-845\n", text)
+
+    def test_a_move_that_is_so_short_that_no_CR_comes(self):
+        with guarded("mpc", rig(guard.MPC), "--quirks", "small-move-silent") as (_, g, port):
+            port.send(b"M" + POINT(3, 0, 0)) # 3 microsteps [P]
+            emu.wait_until(lambda: g.status()["state"] == "armed" and g.status()["forwarded"] == 1, "its end")
+            self.assertEqual(len(port.ask(b"C", 14)), 14)
+            g.stop()
+            path = g.log + ".rec"
+            self.assertEqual(guard.run("log", g.log, "--config", g.config, "--record", path)[0], 0)
+            self.assertRegex(read(path), r" > 4D 03 00 00 00 00 00 00 00 00 00 00 00\n[^<]* mpc > 43\n")
+
+    def test_what_cannot_be_told(self):
+        with guarded("mpc", rig(guard.MPC)) as (_, g, _):
+            g.stop()
+            out = g.log + ".rec"
+            other = g.config + ".other"
+            with open(other, "w", encoding="ascii") as file:
+                file.write(rig(guard.MPC, margin=1))
+            for status, words, *args in ((2, "--record needs --config", "--record", out), (2, "the other way round", "--config", g.config),
+                                         (4, "1 of other ones", "--config", other, "--record", out),
+                                         (1, "No such file", "--config", g.config, "--record", "/nowhere/x"),
+                                         (3, "No such file", "--config", "/nowhere/x", "--record", out)):
+                code, _, err = guard.run("log", g.log, *args)
+                self.assertEqual((args, code), (args, status))
+                self.assertIn(words, err)
+            self.assertEqual(guard.run("log", "/nowhere/x")[0], 1)
+            self.assertEqual(guard.run("log", "/")[0], 4)
+
+
 if __name__ == "__main__":
     guard.main()

@@ -227,7 +227,7 @@ class Killed(unittest.TestCase):
         self.host.stdin.flush()
         self.guard.wait_for("moving")
         emu.wait_until(lambda: not self.guard.status()["within_frame"], "the frame to leave: it has a pause of 35 ms within")
-        guard.pause(0.1) # its last bytes are on the line
+        guard.pause(0.2) # its last bytes are off the line, as far as the guard may know
 
     def restart_device(self):
         self.emulator = emu.Emulator("mpc", "--link", self.device_link)

@@ -89,7 +89,6 @@ static bool open_recording(bridge *b)
     char text[16];
     const dr_limits *const l = &b->rig.limits;
     const char *const name = recorded_name(b);
-    uint8_t ports = 0;
     if (b->options->record == NULL)
         return true;
     if (!recording_open(&b->recording, "dryrig-guard", b->options->record))
@@ -97,10 +96,7 @@ static bool open_recording(bridge *b)
     recording_set(&b->recording, name, "controller", name);
     (void)dr_words_firmware(text, sizeof text, l->firmware);
     recording_set(&b->recording, name, "firmware", text);
-    for (uint8_t drive = 0; drive < DR_PORTS; drive++)
-        if (l->drives[drive].stage != DR_STAGE_NONE)
-            ports = (uint8_t)(drive + 1u);
-    for (uint8_t drive = 0; drive < ports; drive++)
+    for (uint8_t drive = 0; drive < rig_ports(l); drive++)
         recording_set(&b->recording, name, "device", dr_words_stage((dr_stage_id)l->drives[drive].stage));
     return true;
 }

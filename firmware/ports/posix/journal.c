@@ -96,7 +96,7 @@ const journal_entry *journal_last(const journal *j, uint64_t n)
     return n < j->count && n < JOURNAL_KEPT ? &j->kept[(j->count - 1u - n) % JOURNAL_KEPT] : NULL;
 }
 
-/* -- Verifying --------------------------------------------------------------------------------------------------------- */
+/* -- Reading ----------------------------------------------------------------------------------------------------------- */
 
 static uint8_t nibble(char digit) { return (uint8_t)(digit <= '9' ? digit - '0' : digit - 'a' + 10); }
 
@@ -116,46 +116,70 @@ static uint32_t get_uint(const uint8_t *bytes)
     return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
 }
 
-/* The chain begins anew with every start of a guard, at sequence 0. */
-static const char *verify_line(const char *line, uint32_t *sequence, uint32_t *crc)
+/* As dr_record_put() has put it. */
+static dr_record get_record(const uint8_t bytes[DR_RECORD_BYTES])
 {
-    uint8_t bytes[DR_RECORD_BYTES];
-    const size_t body = DR_RECORD_BYTES - sizeof *crc;
-    if (!get_bytes(line, bytes))
-        return "there is no whole record";
-    const uint32_t number = get_uint(bytes), told = get_uint(bytes + body);
-    const uint32_t is = dr_crc32c(number == 0 ? 0 : *crc, bytes, body);
-    if (number != 0 && number != *sequence)
-        return "records are missing before it";
-    if (is != told)
-        return "the record was changed, or the one before it was";
-    *sequence = number + 1u;
-    *crc = told;
-    return NULL;
+    dr_record r = {.sequence = get_uint(bytes), .when = get_uint(bytes + 4)};
+    const uint8_t *const at = bytes + 8;
+    r.event = at[0];
+    r.before = at[1];
+    r.after = at[2];
+    r.code = at[3];
+    r.axis = at[4];
+    r.item = at[5];
+    r.op = at[6];
+    r.count = at[7];
+    memcpy(r.bytes, bytes + 16, DR_RECORD_TEXT);
+    for (unsigned axis = 0; axis < DR_AXES; axis++)
+        r.position_steps[axis] = get_uint(bytes + 16 + DR_RECORD_TEXT + 4u * axis);
+    r.crc = get_uint(bytes + DR_RECORD_BYTES - 4u);
+    return r;
 }
 
-bool journal_verify(const char *path, uint64_t *records, uint64_t *starts, char *why, size_t room)
+bool journal_start_reading(journal_reader *r, const char *path)
 {
-    FILE *file = fopen(path, "re");
-    char *line = NULL;
-    size_t line_room = 0;
-    uint32_t sequence = UINT32_MAX, crc = 0;
-    const char *wrong = NULL;
-    *records = *starts = 0;
-    if (file == NULL) {
-        (void)snprintf(why, room, "%s: %s", path, strerror(errno));
-        return false;
-    }
-    for (uint64_t number = 1; wrong == NULL && getline(&line, &line_room, file) > 0; number++) {
-        if (strcmp(line, "\n") == 0) /* the log could not be written for a while */
-            continue;
-        wrong = verify_line(line, &sequence, &crc);
-        ++*records;
-        *starts += sequence == 1u;
-        if (wrong != NULL)
-            (void)snprintf(why, room, "%s:%llu: %s", path, (unsigned long long)number, wrong);
-    }
-    free(line);
-    (void)fclose(file);
-    return wrong == NULL;
+    memset(r, 0, sizeof *r);
+    r->path = path;
+    r->file = fopen(path, "re");
+    if (r->file == NULL)
+        (void)snprintf(r->why, sizeof r->why, "%s: %s", path, strerror(errno));
+    return r->file != NULL;
+}
+
+static bool wrong(journal_reader *r, const char *why)
+{
+    (void)snprintf(r->why, sizeof r->why, "%s:%llu: %s", r->path, (unsigned long long)r->line, why);
+    return false;
+}
+
+/* The chain begins anew with every start of a guard, at sequence 0. */
+bool journal_read(journal_reader *r, dr_record *out)
+{
+    uint8_t bytes[DR_RECORD_BYTES];
+    do { /* an empty line: the log could not be written for a while */
+        if (getline(&r->text, &r->room, r->file) <= 0)
+            return ferror(r->file) != 0 ? wrong(r, strerror(errno)) : false;
+        r->line++;
+    } while (strcmp(r->text, "\n") == 0);
+    if (!get_bytes(r->text, bytes))
+        return wrong(r, "there is no whole record");
+    *out = get_record(bytes);
+    if (out->sequence != 0 && (r->records == 0 || out->sequence != r->sequence))
+        return wrong(r, "records are missing before it");
+    if (out->crc != dr_crc32c(out->sequence == 0 ? 0 : r->crc, bytes, DR_RECORD_BYTES - sizeof out->crc))
+        return wrong(r, "the record was changed, or the one before it was");
+    r->sequence = out->sequence + 1u;
+    r->crc = out->crc;
+    r->records++;
+    r->starts += out->sequence == 0;
+    return true;
+}
+
+void journal_stop_reading(journal_reader *r)
+{
+    free(r->text);
+    if (r->file != NULL)
+        (void)fclose(r->file);
+    r->text = NULL;
+    r->file = NULL;
 }

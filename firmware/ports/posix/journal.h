@@ -1,13 +1,15 @@
 /* journal: keeps what a guard did: the last records in memory, and all of them in a file.
  *
  * The file is a text, one line a record: time, event, words, and '#' with the record's DR_RECORD_BYTES in hexadecimal,
- * which are chained by their CRCs; journal_verify() finds lines that were changed, left out or put in.
+ * which are chained by their CRCs: a reader finds lines that were changed, left out or put in.
  * Thread-safety: one thread at a time per journal. */
 #ifndef JOURNAL_H
 #define JOURNAL_H
 
 #include "dr_guard.h"
 #include "rig.h"
+
+#include <stdio.h>
 
 #define JOURNAL_KEPT 500u /* records in memory */
 #define JOURNAL_TIME_MAX 32u
@@ -38,8 +40,22 @@ void journal_time(char text[JOURNAL_TIME_MAX], uint64_t wall_us);
 /* out has room for 2 * DR_RECORD_BYTES + 1. */
 void journal_hex(char *out, const dr_record *record);
 
-/* Reads a file that a journal has written. False: why[] says in which line the chain breaks; or that, and errno's reason.
- * records, starts: how many there are. */
-bool journal_verify(const char *path, uint64_t *records, uint64_t *starts, char *why, size_t room);
+/* -- Reading a file that a journal has written -------------------------------------------------------------------------- */
+
+typedef struct {
+    FILE *file;
+    const char *path;
+    char *text; /* the line */
+    size_t room;
+    uint64_t line, records, starts; /* so far; starts: of guards */
+    uint32_t sequence, crc;         /* of the next record; of the last */
+    char why[RIG_WHY_MAX];          /* what is wrong with this line: the chain breaks here */
+} journal_reader;
+
+/* False: why[] says what the system says. */
+bool journal_start_reading(journal_reader *r, const char *path);
+/* The next record. False: there is none; why[] is empty at the end of the file, and says what is wrong before it. */
+bool journal_read(journal_reader *r, dr_record *out);
+void journal_stop_reading(journal_reader *r);
 
 #endif

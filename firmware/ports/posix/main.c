@@ -5,15 +5,17 @@
  *     dryrig-guard explain FILE --from X,Y,Z "..."  explain_motion(): would this pass?
  *     dryrig-guard compile FILE --output FILE       image_write(): for a microcontroller
  *     dryrig-guard ctl SOCKET ORDER                 ctl: orders to a guard that runs
- *     dryrig-guard log FILE                         journal_verify(): is a log whole?
+ *     dryrig-guard log FILE                         journal_read(): is a log whole? retell(): replay it
  */
 #define _GNU_SOURCE /* argp */
 #include "bridge.h"
 #include "ctl.h"
 #include "explain.h"
 #include "image.h"
+#include "retell.h"
 
 #include <argp.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -150,7 +152,7 @@ static int run(int argc, char **argv)
     return read_config(&b.rig, o.config) ? bridge_run(&b, &o) : EXIT_CONFIG;
 }
 
-/* -- check, log: one file ---------------------------------------------------------------------------------------------- */
+/* -- check ------------------------------------------------------------------------------------------------------------- */
 
 static error_t parse_file(int key, char *value, struct argp_state *state)
 {
@@ -178,22 +180,97 @@ static int check(int argc, char **argv)
     return fflush(stdout) == 0 ? EXIT_DONE : EXIT_CANNOT;
 }
 
-static int verify_log(int argc, char **argv)
+/* -- log --------------------------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    const char *path, *config, *record;
+} log_options;
+
+static error_t parse_log(int key, char *value, struct argp_state *state)
 {
-    static const struct argp argp = {
-        NULL, parse_file, "FILE", "Verifies that no record of a log was changed, left out or put in.\v" STATUS_WORDS,
-        NULL, NULL,       NULL};
-    uint64_t records, starts;
-    char why[RIG_WHY_MAX];
-    const char *path = NULL;
-    (void)argp_parse(&argp, argc, argv, 0, NULL, &path);
-    if (!journal_verify(path, &records, &starts, why, sizeof why)) {
-        (void)fprintf(stderr, "dryrig-guard: %s\n", why);
-        return access(path, R_OK) == 0 ? EXIT_NO : EXIT_CANNOT;
+    log_options *const o = state->input;
+    switch (key) {
+    case CONFIG:
+        once(state, &o->config, "--config", value);
+        break;
+    case RECORD:
+        once(state, &o->record, "--record", value);
+        break;
+    case ARGP_KEY_ARG:
+        once(state, &o->path, "the file", value);
+        break;
+    case ARGP_KEY_END:
+        if (o->path == NULL)
+            argp_error(state, "which file?");
+        if ((o->config == NULL) != (o->record == NULL))
+            argp_error(
+                state,
+                "--record needs --config, and the other way round: a log does not tell which controller it is of");
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
     }
-    (void)printf("%s: whole, %llu records of %llu starts\n", path, (unsigned long long)records,
-                 (unsigned long long)starts);
+    return 0;
+}
+
+static int refuse_log(const char *why, int status)
+{
+    (void)fprintf(stderr, "dryrig-guard: %s\n", why);
+    return status;
+}
+
+static int retell_log(journal_reader *reader, const log_options *o)
+{
+    static rig r;
+    char why[RIG_WHY_MAX] = "";
+    if (!read_config(&r, o->config))
+        return EXIT_CONFIG;
+    FILE *const to = fopen(o->record, "we");
+    if (to == NULL) {
+        (void)snprintf(why, sizeof why, "%s: %s", o->record, strerror(errno));
+        return refuse_log(why, EXIT_CANNOT);
+    }
+    const bool is_told = retell(reader, &r, to, why, sizeof why);
+    if (fclose(to) == 0 && is_told)
+        return EXIT_DONE;
+    if (is_told)
+        (void)snprintf(why, sizeof why, "%s: %s", o->record, strerror(errno));
+    return refuse_log(why, EXIT_NO);
+}
+
+static int verify_log(journal_reader *reader)
+{
+    dr_record record;
+    while (journal_read(reader, &record)) {}
+    if (reader->why[0] != '\0')
+        return refuse_log(reader->why, EXIT_NO);
+    (void)printf("%s: whole, %llu records of %llu starts\n", reader->path, (unsigned long long)reader->records,
+                 (unsigned long long)reader->starts);
     return EXIT_DONE;
+}
+
+static int read_log(int argc, char **argv)
+{
+    static const struct argp_option known[] = {
+        {"record", RECORD, "OUT", 0, "Write the bytes on the controller's line to OUT, for 'dryrig-emu replay'", 1},
+        {"config", CONFIG, "RIG", 0, "The configuration under which the log was written", 1},
+        {NULL, 0, NULL, 0, NULL, 0}};
+    static const struct argp argp = {
+        known,
+        parse_log,
+        "FILE",
+        "Verifies that no record of a log was changed, left out or put in; or makes a recording of it.\v" STATUS_WORDS,
+        NULL,
+        NULL,
+        NULL};
+    journal_reader reader;
+    log_options o = {NULL, NULL, NULL};
+    (void)argp_parse(&argp, argc, argv, 0, NULL, &o);
+    if (!journal_start_reading(&reader, o.path))
+        return refuse_log(reader.why, EXIT_CANNOT);
+    const int status = o.record != NULL ? retell_log(&reader, &o) : verify_log(&reader);
+    journal_stop_reading(&reader);
+    return status;
 }
 
 /* -- compile ----------------------------------------------------------------------------------------------------------- */
@@ -405,7 +482,7 @@ int main(int argc, char **argv)
         int (*run)(int, char **);
     } uses[] = {
         {"dryrig-guard check", check}, {"dryrig-guard explain", explain}, {"dryrig-guard compile", compile},
-        {"dryrig-guard ctl", ctl},     {"dryrig-guard log", verify_log},
+        {"dryrig-guard ctl", ctl},     {"dryrig-guard log", read_log},
     };
     argp_err_exit_status = EXIT_USAGE;
     fill_standard_fds();

@@ -693,6 +693,15 @@ static void tell_problem(reader *r, const config_setting_t *root, dr_limits_prob
     fail_at(r, line, "%s%s", says, axes[problem.axis < DR_AXES ? problem.axis : DR_AXES]);
 }
 
+uint8_t rig_ports(const dr_limits *l)
+{
+    uint8_t ports = 0;
+    for (uint8_t drive = 0; drive < DR_PORTS; drive++)
+        if (l->drives[drive].stage != DR_STAGE_NONE)
+            ports = (uint8_t)(drive + 1u);
+    return ports;
+}
+
 uint32_t rig_count_free(const dr_limits *l, uint8_t drive, uint32_t one[DR_AXES])
 {
     dr_stage stage;

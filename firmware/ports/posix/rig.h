@@ -24,6 +24,9 @@ typedef struct {
  * has no lines), and *out must not be used. */
 bool rig_read(rig *out, const char *path, char *why, size_t room);
 
+/* Ports up to the last that has a drive. */
+uint8_t rig_ports(const dr_limits *limits);
+
 /* At how many points of a grid of RIG_GRID^3 in a drive's box a tip may stand. one: where one of them is; NULL: never mind. */
 uint32_t rig_count_free(const dr_limits *limits, uint8_t drive, uint32_t one[DR_AXES]);
 
