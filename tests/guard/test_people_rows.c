@@ -1,4 +1,4 @@
-/* What people, cables and the guard's own machine may do: rows 58 to 78 of the fault matrix, and "a stop never moves". */
+/* What people, cables and the guard's own machine may do: rows 58 to 78 of the fault matrix; row 64 is test_stop.c. */
 #include "bench.h"
 
 #include <string.h>
@@ -117,86 +117,6 @@ static void row_63_a_changed_tip_disarms_until_it_is_confirmed(void)
 }
 
 /* -- Stop --------------------------------------------------------------------------------------------------------------- */
-
-static void no_move_begins_after(uint64_t when, size_t steps_at_most, const uint32_t *at)
-{
-    uint32_t steps[DR_AXES];
-    (void)when;
-    run_ms(1500);
-    dr_controller_position(&rig.controller, 0, guard_clock(), steps);
-    for (uint8_t axis = 0; axis < DR_AXES; axis++)
-        TEST_ASSERT_UINT32_WITHIN(steps_at_most, at[axis], steps[axis]);
-}
-
-/* From the first byte of the host's frame to well after the end of the move, every half millisecond: STOP. The tip comes to
- * rest where it is but for what it travels while ^C is on the line. */
-static void row_64_stop_at_every_moment(void)
-{
-    for (int kind = DR_TRIO; kind <= DR_MPC; kind++)
-        for (uint64_t us = 0; us < 160000; us += 500) {
-            uint32_t at[DR_AXES];
-            if (kind == DR_TRIO)
-                bench_armed_trio();
-            else
-                bench_armed_mpc();
-            const uint32_t start = kind == DR_TRIO ? 40000 : 80000;
-            host_line(15, start + 2000, start, start);
-            run_us(us);
-            dr_controller_position(&rig.controller, 0, guard_clock(), at);
-            const bool in_pause = rig.guard.out_at > 0 && rig.guard.out_at < rig.guard.out_count;
-            stop_input(true);
-            TEST_ASSERT_TRUE(status().state == DR_GUARD_STOPPING);
-            /* 3 bytes of the line: one under way, ^C, and the last of a frame that had to be finished; plus that frame's move */
-            no_move_begins_after(rig.now, in_pause ? 16 : 40, at);
-            expect_state(DR_GUARD_STOPPED);
-            expect_fault(DR_FAULT_NONE);
-            const uint32_t wire = rig.wire_count;
-            run_ms(2000);
-            TEST_ASSERT_EQUAL(wire, rig.wire_count);
-            stop_input(false);
-            run_ms(100);
-            expect_state(DR_GUARD_STOPPED); /* row 67 */
-            TEST_ASSERT_EQUAL(wire, rig.wire_count);
-        }
-}
-
-static void row_64_stop_within_every_frame_of_the_host(void)
-{
-    uint8_t frame[14];
-    put_line_frame(frame, 15, 44000, 40000, 40000);
-    for (size_t cut = 0; cut <= 14; cut++) {
-        const uint32_t at[DR_AXES] = {40000, 40000, 40000};
-        bench_armed_trio();
-        host_bytes(frame, cut);
-        stop_input(true);
-        host_bytes(frame + cut, 14 - cut);
-        no_move_begins_after(rig.now, 0, at);
-        TEST_ASSERT_EQUAL(cut == 14 ? 0 : 0, status().forwarded);
-    }
-}
-
-static void row_64_a_stop_never_moves_a_controller_that_only_pauses(void)
-{
-    for (uint64_t ms = 10; ms < 400; ms += 13) {
-        bench_mpc();
-        rig.controller.quirks = DR_QUIRK_PAUSE_ON_STOP;
-        bench_start();
-        bench_arm();
-        uint32_t at[DR_AXES];
-        host_line(15, 88000, 80000, 80000);
-        run_ms(ms);
-        stop_input(true);
-        run_ms(10);
-        dr_controller_position(&rig.controller, 0, guard_clock(), at);
-        for (int i = 0; i < 5; i++) {
-            stop_input(false);
-            run_ms(50);
-            stop_input(true);
-        }
-        no_move_begins_after(rig.now, ms < 60 ? 16 : 0, at);
-        expect_state(DR_GUARD_STOPPED);
-    }
-}
 
 static void row_65_arming_needs_a_fresh_edge_and_no_stop(void)
 {
@@ -771,9 +691,6 @@ int main(void)
     RUN_TEST(row_60_another_drive_by_hand_during_the_move);
     RUN_TEST(row_60_another_drive_by_hand_before_the_move);
     RUN_TEST(row_63_a_changed_tip_disarms_until_it_is_confirmed);
-    RUN_TEST(row_64_stop_at_every_moment);
-    RUN_TEST(row_64_stop_within_every_frame_of_the_host);
-    RUN_TEST(row_64_a_stop_never_moves_a_controller_that_only_pauses);
     RUN_TEST(row_65_arming_needs_a_fresh_edge_and_no_stop);
     RUN_TEST(row_65_a_stop_while_arming);
     RUN_TEST(row_65_the_key_off_while_arming);
