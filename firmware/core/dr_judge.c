@@ -36,7 +36,8 @@ static bool calibrates(uint8_t op)
 
 static dr_stage stage_of(const dr_limits *l, uint8_t drive)
 {
-    dr_stage stage = {0, 1, 1, 0, {0, 0, 0}};
+    dr_stage stage;
+    memset(&stage, 0, sizeof stage); /* nothing connected: no travel */
     (void)dr_stage_get((dr_stage_id)l->drives[drive].stage, &stage);
     return stage;
 }
@@ -399,7 +400,7 @@ static dr_verdict judge_speed(const dr_limits *l, uint8_t drive, uint8_t level, 
     const dr_drive_limits *d = &l->drives[drive];
     const uint8_t cap = below ? d->slow_level : d->fast_level;
     const uint32_t speed = dr_judge_speed(l, drive, level, true), limit = dr_judge_speed(l, drive, cap, true);
-    if (cap < DR_SPEED_FULL && speed > limit)
+    if (speed > limit)
         return refuse(DR_REASON_SPEED, DR_AXES, speed, limit);
     return allowed;
 }
@@ -407,11 +408,11 @@ static dr_verdict judge_speed(const dr_limits *l, uint8_t drive, uint8_t level, 
 /* Does every point that the way may touch lie along the approach line? The farthest is a corner. */
 static bool keeps_to_line(const dr_drive_limits *d, const dr_path *path)
 {
-    const uint8_t corners = path->straight ? 1u : 8u;
-    for (uint8_t corner = 0; corner < corners; corner++) {
+    for (uint8_t corner = path->straight ? 7u : 0u; corner < 8u;
+         corner++) { /* a bit per axis; the last is the target */
         int32_t move_q[DR_AXES];
         for (uint8_t axis = 0; axis < DR_AXES; axis++) {
-            const bool moves = path->straight || (((unsigned)corner >> axis) & 1u) != 0;
+            const bool moves = (((unsigned)corner >> axis) & 1u) != 0;
             move_q[axis] = moves ? path->line.to_q[axis] - path->line.from_q[axis] : 0;
         }
         if (!dr_is_along(move_q, d->approach, DR_LATERAL_TOLERANCE_Q))

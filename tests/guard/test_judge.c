@@ -71,6 +71,16 @@ static dr_reason judge_level(uint8_t level, uint32_t x, uint32_t y, uint32_t z)
 #define ALLOWED(verdict) TEST_ASSERT_EQUAL(DR_REASON_NONE, verdict)
 #define REFUSED(expected, verdict) TEST_ASSERT_EQUAL(expected, verdict)
 
+/* All that a verdict tells. */
+static void tells(dr_reason reason, uint8_t axis, uint8_t item, int64_t measured, int64_t limit, dr_verdict verdict)
+{
+    TEST_ASSERT_EQUAL(reason, verdict.reason);
+    TEST_ASSERT_EQUAL(axis, verdict.axis);
+    TEST_ASSERT_EQUAL(item, verdict.item);
+    TEST_ASSERT_EQUAL_INT64(measured, verdict.measured);
+    TEST_ASSERT_EQUAL_INT64(limit, verdict.limit);
+}
+
 static dr_obstacle *keep_out(int32_t x0, int32_t x1, int32_t y0, int32_t y1, int32_t z0, int32_t z1)
 {
     dr_obstacle *o = &limits.obstacles[limits.obstacle_count++];
@@ -622,6 +632,282 @@ static void row_49_what_stop_broke_off_must_be_clear_too(void)
     REFUSED(DR_REASON_OLD_TARGET, judge('M', 5100, 5000, 8000));
 }
 
+/* -- What verdicts tell, and where exactly they turn ------------------------------------------------------------------------------------ */
+
+static void verdicts_tell_axis_item_and_numbers(void)
+{
+    const uint8_t none = DR_AXES;
+    tells(DR_REASON_NONE, none, DR_NO_ITEM, 0, 0, verdict_of('x', 0, 40001, 0, 0));
+    tells(DR_REASON_AMBIGUOUS, DR_X, DR_NO_ITEM, 0, 0, verdict_of('X', 0, 40001, 0, 0));
+    tells(DR_REASON_AMBIGUOUS, DR_Z, DR_NO_ITEM, 0, 0, verdict_of('Z', 0, 0, 0, 40001));
+    tells(DR_REASON_LEVEL, none, DR_NO_ITEM, 16, 15, verdict_of('S', 16, 40000, 40000, 40000));
+    tells(DR_REASON_ANGLE_VALUE, none, DR_NO_ITEM, 9, 10, verdict_of('A', 9, 0, 0, 0));
+    tells(DR_REASON_ANGLE_VALUE, none, DR_NO_ITEM, 81, 80, verdict_of('A', 81, 0, 0, 0));
+    tells(DR_REASON_CALIBRATE, none, DR_NO_ITEM, 0, 0, verdict_of('R', 0, 0, 0, 0));
+    scene.angle_deg = 90;
+    tells(DR_REASON_ANGLE, none, DR_NO_ITEM, 90, 0, verdict_of('x', 0, 40001, 0, 0));
+    scene.angle_deg = 30;
+    scene.frame_lost = true;
+    tells(DR_REASON_FRAME_LOST, none, DR_NO_ITEM, 0, 0, verdict_of('x', 0, 40001, 0, 0));
+    scene.frame_lost = false;
+    keep_out(1000, 2000, 1000, 2000, 1000, 2000);
+    floor_below(3000);
+    tells(DR_REASON_KEEP_OUT, none, 1, 0, 0, verdict_of('z', 0, 0, 0, 20000));
+    tells(DR_REASON_ESCAPE, none, 1, 0, 0, (at(5000, 5000, 2500), verdict_of('S', 0, 40000, 40000, 19999)));
+    tells(DR_REASON_ESCAPE, none, DR_NO_ITEM, 0, 0, verdict_of('H', 0, 40000, 40000, 20001));
+    tells(DR_REASON_KEEP_OUT, none, 1, 0, 0, dr_judge_place(&limits, 0, scene.start_steps));
+    tells(DR_REASON_DRIVE, none, DR_NO_ITEM, 3, 0, dr_judge_place(&limits, 2, scene.start_steps));
+    rig(DR_MPC);
+    tells(DR_REASON_STREAM, none, DR_NO_ITEM, 0, 0, verdict_of('O', 0, 0, 0, 0));
+    tells(DR_REASON_DRIVE_VALUE, none, DR_NO_ITEM, 3, 0, verdict_of('I', 3, 0, 0, 0));
+    tells(DR_REASON_MODE_VALUE, none, DR_NO_ITEM, 10, 9, verdict_of('L', 10, 0, 0, 0));
+}
+
+static void the_frame_alone_is_held_against_the_longest_travel(void)
+{
+    static const uint32_t travel[DR_AXES] = {533333, 133333, 266667}; /* an MP-865 [T] */
+    dr_command command;
+    limits.drives[0].stage = DR_STAGE_NONE;
+    TEST_ASSERT_TRUE(dr_command_find(DR_TRIO, limits.firmware, 'S', &command));
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        dr_request request = {command.op, 0, {0, 0, 0}};
+        request.steps[axis] = 1; /* nothing is connected: no travel at all */
+        tells(DR_REASON_RANGE, axis, DR_NO_ITEM, 1, 0, dr_judge_frame(&limits, &command, &request));
+    }
+    TEST_ASSERT_TRUE(dr_limits_init_drive(&limits, 0, DR_STAGE_TRIO_MP865));
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        dr_request request = {command.op, 0, {0, 0, 0}};
+        request.steps[axis] = travel[axis];
+        tells(DR_REASON_NONE, DR_AXES, DR_NO_ITEM, 0, 0, dr_judge_frame(&limits, &command, &request));
+        request.steps[axis]++;
+        tells(DR_REASON_RANGE, axis, DR_NO_ITEM, travel[axis] + 1, travel[axis],
+              dr_judge_frame(&limits, &command, &request));
+    }
+    rig(DR_MPC);
+    at(5000, 5000, 5000);
+    TEST_ASSERT_TRUE(dr_limits_init_drive(&limits, 1, DR_STAGE_MPC_MP845)); /* 533,333 steps: more than drive 0 */
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        uint32_t to[DR_AXES] = {80000, 80000, 80000};
+        to[axis] = 400001;
+        tells(DR_REASON_RANGE, axis, DR_NO_ITEM, 400001, 400000, verdict_of('M', 0, to[0], to[1], to[2]));
+    }
+}
+
+static void what_a_frame_does_not_carry_does_not_count(void)
+{
+    ALLOWED(verdict_of('x', 255, 40001, 0, 0).reason);
+    ALLOWED(verdict_of('H', 16, 40001, 40000, 40000).reason);
+    all_travel(0, 200000 * 8);
+    ALLOWED(verdict_of('h', 255, UINT32_MAX, UINT32_MAX, 200001).reason);
+    limits.drives[0].fast_level = 15; /* an empty frame is no 'S' of level 0 either */
+    limits.drives[0].slow_level = 0;
+    ALLOWED(verdict_of('x', 0, 40001, 0, 0).reason);
+}
+
+static void all_four_drives_can_be_chosen(void)
+{
+    rig(DR_MPC);
+    for (uint8_t drive = 0; drive < DR_PORTS; drive++)
+        TEST_ASSERT_TRUE(dr_limits_init_drive(&limits, drive, DR_STAGE_MPC_MP225));
+    for (uint8_t drive = 0; drive <= DR_PORTS + 1u; drive++)
+        REFUSED(drive >= 1 && drive <= DR_PORTS ? DR_REASON_NONE : DR_REASON_DRIVE_VALUE,
+                verdict_of('I', drive, 0, 0, 0).reason);
+}
+
+static void a_hidden_target_needs_every_face_of_the_travel(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        all_travel(0, 200000 * 8);
+        limits.drives[0].box_q.min_q[axis] = 1;
+        tells(DR_REASON_HIDDEN, axis, DR_NO_ITEM, 0, 1, verdict_of('h', 0, 0, 0, 0));
+        all_travel(0, 200000 * 8);
+        limits.drives[0].box_q.max_q[axis]--;
+        tells(DR_REASON_HIDDEN, axis, DR_NO_ITEM, 200000 * 8, 200000 * 8 - 1, verdict_of('h', 0, 0, 0, 0));
+    }
+}
+
+static void a_calibration_goes_no_farther_than_it_ends(void)
+{
+    limits.rig |= DR_RIG_MAY_CALIBRATE;
+    scene.may_calibrate = true;
+    at(500, 500, 500);
+    dr_obstacle *o = keep_out(1000, 3000, 0, 3000, 0, 3000); /* a TRIO's ends at 1,000 um */
+    REFUSED(DR_REASON_KEEP_OUT, judge('R', 0, 0, 0));
+    o->box_q.min_q[DR_X]++;
+    ALLOWED(judge('R', 0, 0, 0));
+    rig(DR_MPC);
+    at(500, 500, 500);
+    limits.rig |= DR_RIG_MAY_CALIBRATE;
+    scene.may_calibrate = true;
+    o = keep_out(0, 13000, 12500, 13000, 0, 13000); /* an MPC-200's in the middle */
+    REFUSED(DR_REASON_KEEP_OUT, judge('N', 0, 0, 0));
+    o->box_q.min_q[DR_Y]++;
+    ALLOWED(judge('N', 0, 0, 0));
+}
+
+static void the_window_of_a_knob_is_rounded_up(void)
+{
+    dr_command line, move;
+    rig(DR_MPC);
+    limits.rig = 0;
+    TEST_ASSERT_TRUE(dr_command_find(DR_MPC, 0x0321, 'S', &line));
+    TEST_ASSERT_TRUE(dr_command_find(DR_MPC, 0x0321, 'M', &move));
+    limits.knob_q_per_s = 1;
+    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &line));
+    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &move));
+    limits.knob_q_per_s = 100;
+    TEST_ASSERT_EQUAL(5, dr_judge_margin_q(&limits, &line));
+    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &move));
+    limits.knob_q_per_s = 101;
+    TEST_ASSERT_EQUAL(6, dr_judge_margin_q(&limits, &line));
+    TEST_ASSERT_EQUAL(2, dr_judge_margin_q(&limits, &move));
+}
+
+static void every_obstacle_counts_and_none_beyond_the_count(void)
+{
+    keep_out(1000, 2000, 1000, 2000, 1000, 2000);
+    keep_out(2000, 3000, 2000, 3000, 2000, 3000);
+    keep_out(4000, 6000, 4000, 6000, 4000, 6000);
+    tells(DR_REASON_KEEP_OUT, DR_AXES, 2, 0, 0, dr_judge_place(&limits, 0, scene.start_steps));
+    limits.obstacle_count = 2; /* the third is still there, but not in force */
+    tells(DR_REASON_NONE, DR_AXES, DR_NO_ITEM, 0, 0, dr_judge_place(&limits, 0, scene.start_steps));
+    ALLOWED(judge('S', 5001, 5000, 5000));
+    limits.drives[0].box_q.min_q[DR_X] = UM(5100); /* nor on the way out of another forbidden place */
+    ALLOWED(judge('S', 5050, 5000, 5000));
+    rig(DR_MPC);
+    at(5000, 5000, 5000);
+    keep_out(4000, 6000, 4000, 6000, 4000, 6000)->drive = 1;
+    TEST_ASSERT_EQUAL(DR_REASON_NONE, dr_judge_place(&limits, 0, scene.start_steps).reason);
+    TEST_ASSERT_EQUAL(DR_REASON_KEEP_OUT, dr_judge_place(&limits, 1, scene.start_steps).reason);
+}
+
+static void an_escape_tells_by_how_much_it_is_outside_and_was(void)
+{
+    limits.drives[0].box_q = (dr_box){{UM(1000), UM(1000), UM(1000)}, {UM(9000), UM(9000), UM(9000)}};
+    at(500, 5000, 5000);
+    tells(DR_REASON_ESCAPE, DR_X, DR_NO_ITEM, UM(600), UM(500), verdict_of('S', 0, 400 * 8, 40000, 40000));
+    tells(DR_REASON_ESCAPE, DR_Y, DR_NO_ITEM, UM(100), 0,
+          (at(500, 8900, 5000), verdict_of('S', 0, 600 * 8, 9100 * 8, 40000)));
+    tells(DR_REASON_ESCAPE, DR_Z, DR_NO_ITEM, UM(300), UM(200),
+          (at(5000, 5000, 9200), verdict_of('S', 0, 40000, 40000, 9300 * 8)));
+    /* A violation of one quantum is one: faces need not lie on microsteps. */
+    limits.drives[0].box_q.max_q[DR_Y] = UM(9000) - 1;
+    at(500, 8999, 5000);
+    tells(DR_REASON_ESCAPE, DR_Y, DR_NO_ITEM, 1, 0, verdict_of('S', 0, 600 * 8, 9000 * 8, 40000));
+    limits.drives[0].box_q = (dr_box){{UM(1000) + 5, 0, 0}, {UM(1000) + 15, UM(9000), UM(9000)}};
+    at(1000, 5000, 5000); /* 5 quanta below; 1 quantum above is out on the other side */
+    tells(DR_REASON_ESCAPE, DR_X, DR_NO_ITEM, 1, 5, verdict_of('S', 0, 8002, 40000, 40000));
+    ALLOWED(verdict_of('S', 0, 8001, 40000, 40000).reason);
+}
+
+/* The smallest length that the Euclidean displacement does not exceed. */
+static void a_slanting_displacement_is_told_rounded_up(void)
+{
+    limits.drives[0].max_move_q = (uint32_t)UM(100);
+    const dr_verdict exact = verdict_of('S', 0, 40000 + 60 * 8, 40000 + 90 * 8, 40000); /* 60, 90: 108.17 um */
+    REFUSED(DR_REASON_STEP, exact.reason);
+    limits.drives[0].max_move_q = (uint32_t)UM(99);
+    tells(DR_REASON_STEP, DR_AXES, DR_NO_ITEM, UM(100), UM(99),
+          verdict_of('S', 0, 40000 + 60 * 8, 40000, 40000 - 80 * 8));
+    for (uint32_t x = 1; x <= 750; x += 7)
+        for (uint32_t z = 700; z <= 790; z += 9) {
+            const int64_t squared = ((int64_t)x * x + (int64_t)z * z) * 64;
+            const dr_verdict verdict = verdict_of('S', 0, 40000 + x, 40000, 40000 - z);
+            if (squared <= (int64_t)UM(99) * UM(99)) {
+                ALLOWED(verdict.reason);
+                continue;
+            }
+            REFUSED(DR_REASON_STEP, verdict.reason);
+            TEST_ASSERT_TRUE(verdict.measured * verdict.measured >= squared);
+            TEST_ASSERT_TRUE((verdict.measured - 1) * (verdict.measured - 1) < squared);
+        }
+}
+
+static void how_long_it_would_last_is_told_rounded_up(void)
+{
+    limits.unstoppable_ms = 200; /* 1 um in 0.2 ms */
+    tells(DR_REASON_UNSTOPPABLE, DR_AXES, DR_NO_ITEM, 201, 200, verdict_of('x', 0, 40000 + 8001, 0, 0));
+    tells(DR_REASON_UNSTOPPABLE, DR_AXES, DR_NO_ITEM, 201, 200, verdict_of('x', 0, 40000 + 8040, 0, 0));
+    tells(DR_REASON_UNSTOPPABLE, DR_AXES, DR_NO_ITEM, 202, 200, verdict_of('x', 0, 40000 + 8041, 0, 0));
+    tells(DR_REASON_UNSTOPPABLE, DR_AXES, DR_NO_ITEM, 2000, 200, verdict_of('x', 0, 40000 + 80000, 0, 0));
+}
+
+static void both_stages_of_home_and_work_order_are_held_against_the_surface(void)
+{
+    surface(4000);
+    limits.drives[0].clearance_q = 0;
+    ALLOWED(judge('W', 5000, 6000, 4001));
+    REFUSED(DR_REASON_SPEED, judge('W', 5000, 6000, 4000)); /* down in the second stage */
+    at(5000, 5000, 4000);
+    REFUSED(DR_REASON_SPEED, judge('H', 5000, 6000, 5000)); /* up in the first */
+    at(5000, 5000, 5000);
+    limits.drives[0].surface_q = UM(4000) - 1; /* one quantum above it is above it */
+    ALLOWED(judge('z', 0, 0, 4000));
+}
+
+static void the_cap_of_an_mpc_holds_with_the_faster_of_two_tables(void)
+{
+    rig(DR_MPC);
+    at(5000, 5000, 5000);
+    for (uint8_t cap = 0; cap <= 16; cap++)
+        for (uint8_t level = 0; level <= 15; level++) {
+            limits.drives[0].fast_level = cap;
+            limits.drives[0].slow_level = 0;
+            REFUSED(level > cap ? DR_REASON_SPEED : DR_REASON_NONE, judge_level(level, 5001, 5000, 5000));
+        }
+    limits.drives[0].fast_level = DR_SPEED_FULL;
+    ALLOWED(judge('M', 5001, 5000, 5000));
+    limits.drives[0].fast_level = 0;
+    tells(DR_REASON_SPEED, DR_AXES, DR_NO_ITEM, 2767 * 64, 338 * 64, verdict_of('S', 15, 5001 * 16, 80000, 80000));
+}
+
+/* The box of a TRIO's staged move has corners off the approach line, on whichever two axes the line slants. */
+static void a_move_in_stages_keeps_to_no_slanting_line(void)
+{
+    static const int16_t lines[][DR_AXES] = {{1, 0, 1}, {0, 1, 1}, {1, 1, 1}, {0, 0, 1}};
+    surface(1000);
+    scene.in_tissue = true;
+    for (size_t i = 0; i < 4; i++) {
+        memcpy(limits.drives[0].approach, lines[i], sizeof lines[i]);
+        const uint32_t to[DR_AXES] = {5100 - 100 * (lines[i][0] == 0), 5100 - 100 * (lines[i][1] == 0), 5100};
+        ALLOWED(judge('S', to[0], to[1], to[2]));
+        REFUSED(i == 3 ? DR_REASON_NONE : DR_REASON_APPROACH, judge('H', to[0], to[1], to[2]));
+        REFUSED(i == 3 ? DR_REASON_NONE : DR_REASON_APPROACH, judge('W', to[0], to[1], to[2]));
+        tells(DR_REASON_APPROACH, DR_AXES, DR_NO_ITEM, 0, 0, verdict_of('S', 0, to[0] * 8, to[1] * 8 + 80, to[2] * 8));
+    }
+}
+
+static void every_move_that_was_broken_off_must_be_clear(void)
+{
+    static const dr_box high = {{UM(5000), UM(5000), UM(9000)}, {UM(5000), UM(5000), UM(9000)}};
+    rig(DR_MPC);
+    at(5000, 5000, 5000);
+    dr_obstacle *o = keep_out(4900, 5100, 4900, 5100, 7000, 7100);
+    o->drive = 1;
+    for (uint8_t drive = 0; drive < 2; drive++) /* drive 0 has nothing in its way */
+        scene.old[drive] = (dr_old_move){true, {80000, 80000, 80000}, high};
+    tells(DR_REASON_OLD_TARGET, DR_AXES, 0, 0, 0, verdict_of('M', 0, 5001 * 16, 80000, 80000));
+    o->drive = 0;
+    tells(DR_REASON_OLD_TARGET, DR_AXES, 0, 0, 0, verdict_of('M', 0, 5001 * 16, 80000, 80000));
+    o->box_q.min_q[DR_Z] = UM(9000) + 1;
+    o->box_q.max_q[DR_Z] = UM(9000) + 2;
+    ALLOWED(judge('M', 5001, 5000, 5000));
+}
+
+static void one_degree_is_no_angle_at_which_an_axis_fails(void)
+{
+    scene.angle_deg = 1;
+    ALLOWED(judge('x', 5001, 0, 0));
+    scene.angle_deg = 0;
+    tells(DR_REASON_ANGLE, DR_AXES, DR_NO_ITEM, 0, 0, verdict_of('x', 0, 40001, 0, 0));
+}
+
+static void in_tissue_without_a_surface_nothing_moves_and_says_so(void)
+{
+    scene.in_tissue = true;
+    tells(DR_REASON_APPROACH, DR_AXES, DR_NO_ITEM, 0, 0, verdict_of('S', 0, 40001, 40000, 40000));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -655,5 +941,22 @@ int main(void)
     RUN_TEST(row_37_38_62_settings_of_an_mpc);
     RUN_TEST(row_60_another_drive_than_the_hosts_does_not_move);
     RUN_TEST(row_49_what_stop_broke_off_must_be_clear_too);
+    RUN_TEST(verdicts_tell_axis_item_and_numbers);
+    RUN_TEST(the_frame_alone_is_held_against_the_longest_travel);
+    RUN_TEST(what_a_frame_does_not_carry_does_not_count);
+    RUN_TEST(all_four_drives_can_be_chosen);
+    RUN_TEST(a_hidden_target_needs_every_face_of_the_travel);
+    RUN_TEST(a_calibration_goes_no_farther_than_it_ends);
+    RUN_TEST(the_window_of_a_knob_is_rounded_up);
+    RUN_TEST(every_obstacle_counts_and_none_beyond_the_count);
+    RUN_TEST(an_escape_tells_by_how_much_it_is_outside_and_was);
+    RUN_TEST(a_slanting_displacement_is_told_rounded_up);
+    RUN_TEST(how_long_it_would_last_is_told_rounded_up);
+    RUN_TEST(both_stages_of_home_and_work_order_are_held_against_the_surface);
+    RUN_TEST(the_cap_of_an_mpc_holds_with_the_faster_of_two_tables);
+    RUN_TEST(a_move_in_stages_keeps_to_no_slanting_line);
+    RUN_TEST(every_move_that_was_broken_off_must_be_clear);
+    RUN_TEST(one_degree_is_no_angle_at_which_an_axis_fails);
+    RUN_TEST(in_tissue_without_a_surface_nothing_moves_and_says_so);
     return UNITY_END();
 }
