@@ -149,8 +149,46 @@ class Stopping(unittest.TestCase):
             self.moving(g, port)
             port.close()
             g.wait_for("disarmed")
+            self.assertEqual(g.status()["disarmed_says"], "the host's program has closed the port")
+            emu.wait_until(lambda: "disarmed: the host's program has closed the port\n" in g.err(), "the words")
             with emu.Port(g.path) as again:
                 self.at_rest(again)
+
+    def test_why_it_is_disarmed_is_told(self):
+        with guarded("mpc", rig(guard.MPC, more="arm_idle_s = 1;")) as (_, g, port), Channel(g.socket) as follower:
+            self.assertNotIn("disarmed_says", follower.order("follow"))
+            g.order("disarm")
+            self.assertEqual(self.until(follower, "disarmed")["disarmed_says"], "somebody has said so")
+            g.arm()
+            self.until(follower, "armed")
+            port.close()
+            self.assertEqual(self.until(follower, "disarmed")["disarmed_says"], "the host's program has closed the port")
+            with emu.Port(g.path):
+                g.arm()
+                self.until(follower, "armed")
+                self.assertEqual(self.until(follower, "disarmed")["disarmed_says"], "nothing was moved for a while (arm_idle_s)")
+                g.arm()
+                self.until(follower, "armed")
+                g.order("tip-changed")
+                self.assertEqual(self.until(follower, "disarmed")["disarmed_says"], "the tip was changed")
+
+    @staticmethod
+    def until(follower, state):
+        told = follower.answer()
+        while told["state"] != state:
+            told = follower.answer()
+        return told
+
+    def test_a_rig_whose_guard_stays_armed(self):
+        with guarded("mpc", rig(guard.MPC, more="stay_armed = true;")) as (_, g, port):
+            port.close()
+            emu.wait_until(lambda: not g.status()["host_open"], "the port to be closed")
+            self.assertEqual(g.status()["state"], "armed")
+            with emu.Port(g.path) as again:
+                self.assertEqual(again.ask(line(15, 10, 0, 0), 1), b"\r")
+                self.moving(g, again) # a move is stopped all the same, and that disarms
+            g.wait_for("disarmed")
+            self.assertEqual(g.status()["disarmed_says"], "the host's program has closed the port")
 
     def test_a_guard_that_is_ended_stops_what_moves(self):
         with emu.directory() as directory, emu.Emulator("mpc") as e:
@@ -323,7 +361,7 @@ class Log(unittest.TestCase):
                 g.wait_for("disarmed")
                 answer = g.order("arm")
                 self.assertEqual((answer["ok"], [need["need"] for need in answer["needs"]]), (False, ["log"]))
-                self.assertEqual(g.err().count("cannot be written"), 1)
+                self.assertEqual(g.err().count("/log cannot be written"), 1)
             self.assertEqual(guard.run("log", g.log)[0], 4) # the last line is cut off, and that shows
 
 

@@ -200,6 +200,7 @@ static void facts_and_permissions_become_bits(void)
         {trio, "knobs_locked = false", "knobs_locked = true", DR_RIG_KNOBS_LOCKED},
         {trio, "\"documented\"", "\"hull\"", DR_RIG_PATHS_UNKNOWN},
         {trio, "allow_calibrate = false", "allow_calibrate = true", DR_RIG_MAY_CALIBRATE},
+        {trio, "allow_calibrate = false", "stay_armed = true", DR_RIG_STAYS_ARMED},
         {mpc, "switch8_on = true;\n    box_um = { x = (0, ", "switch8_on = false;\n    box_um = { x = (0, ",
          DR_RIG_HOME_IS_ZERO | DR_RIG_MAY_STREAM | DR_RIG_Y_LOCKED_OUT << 1},
         {mpc, "switch8_on = true;\n    box_um = { x = (0.", "switch8_on = false;\n    box_um = { x = (0.",
@@ -307,6 +308,7 @@ static const mutant mutants[] = {
     {trio, "revision = 7;", "revision = 7L;", 0, "decimal"},
     {trio, "x = (100, 24900)", "x = [100, 24900.5]", 0, "mismatched element type"},
     /* keys that are not there */
+    {trio, "allow_calibrate = false", "stay_armed = 1", 0, "'stay_armed' is true or false"},
     {trio, "margin_um = 50;", "margins_um = 50;", 0, "no key 'margins_um'"},
     {trio, "margin_um = 50;", "margin = 50;", 0, "'margin' has no unit: it is 'margin_um'"},
     {trio, "max_move_um", "max_move", 0, "'max_move' has no unit: it is 'max_move_um'"},

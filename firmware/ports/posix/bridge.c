@@ -174,6 +174,7 @@ static void read_hints(bridge *b)
         bridge_pump(b);
     }
     pty_look(&b->host);
+    b->host_left = b->host_left || b->host.was_left || b->host.opens == 0;
     tell_link(b);
 }
 
@@ -264,6 +265,7 @@ static void wait(const bridge *b, struct pollfd *fds)
 /* People's orders first: a stop is among them. */
 static void serve(bridge *b, const struct pollfd *fds)
 {
+    b->host_left = false;
     advance(b);
     bridge_pump(b);
     control_serve(&b->control, &fds[FD_CONTROL], orders_take, b);

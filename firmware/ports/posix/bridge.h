@@ -50,6 +50,8 @@ typedef struct {
     uint64_t calibrate_until_us; /* 0: not allowed */
     bool surface_said;           /* a person has said whether the tip is in tissue */
     bool was_armed;
+    bool host_left;            /* since the last event: somebody has closed the host's port */
+    const char *disarmed_says; /* why it is not armed any more; NULL: it has not been, or its state says it */
 
     dr_guard_status shown; /* what followers were told last */
     bool shown_any, said_any;

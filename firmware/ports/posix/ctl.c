@@ -41,6 +41,8 @@ static void print_status(const cJSON *all, const char *path)
     (void)printf("state:    %s", text_of(all, "state"));
     if (*text_of(all, "fault_says") != '\0')
         (void)printf(": %s", text_of(all, "fault_says"));
+    if (*text_of(all, "disarmed_says") != '\0')
+        (void)printf(": %s", text_of(all, "disarmed_says"));
     (void)printf("%s\n", is_true(all, "alarm") ? " SOMETHING MAY STILL MOVE" : "");
     if (*text_of(all, "device_says") != '\0')
         (void)printf("port:     %s\n", text_of(all, "device_says"));

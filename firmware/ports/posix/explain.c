@@ -83,6 +83,8 @@ static void print_drive(FILE *out, const rig *r, uint8_t drive)
     (void)fprintf(out, "  longest move  %s um\n  speed         ", um(a, d->max_move_q));
     print_level(out, l, drive, d->fast_level);
     (void)fprintf(out, "\n");
+    if ((l->rig & DR_RIG_Y_LOCKED_OUT << drive) != 0)
+        (void)fprintf(out, "  homing        may leave Y where it is: switch %u is off\n", l->kind == DR_TRIO ? 5u : 8u);
     print_surface(out, l, drive);
 }
 
@@ -187,6 +189,10 @@ static void print_warnings(FILE *out, const rig *r)
             "  external switch 6 is on: the controller moves every axis when its power comes on; no guard can help\n");
     if (l->host_loss == DR_HOST_LOSS_FINISH && ++count > 0)
         (void)fprintf(out, "  on_host_loss = \"finish\": a move goes on when the program that asked for it has died\n");
+    if ((l->rig & DR_RIG_STAYS_ARMED) != 0 && ++count > 0)
+        (void)fprintf(
+            out, "  stay_armed: any program that opens the port may move, for %u s after the last motion of another\n",
+            l->arm_idle_s);
     if (l->refusal == DR_REFUSE_E && ++count > 0)
         (void)fprintf(out, "  refusal = \"E\": some programs take any byte for the end of a move; see the manual\n");
     if (l->serial[0] == 0 && ++count > 0)
@@ -202,9 +208,11 @@ void explain_rig(FILE *out, const rig *r, const char *path)
     (void)dr_words_firmware(firmware, sizeof firmware, l->firmware);
     (void)fprintf(out, "%s: good\n  controller    %s, firmware %s\n  revision      %u\n  hash          %08X\n", path,
                   dr_words_controller((dr_kind)l->kind), firmware, l->revision, dr_limits_crc(l));
-    (void)fprintf(out, "  refusals      %s\n  host lost     %s\n  disarms       after %u s without a motion\n",
+    (void)fprintf(out, "  refusals      %s\n  host lost     %s\n  disarms       after %u s without a motion; %s\n",
                   l->refusal == DR_REFUSE_E ? "the host gets 'E'" : "the host gets no answer",
-                  l->host_loss == DR_HOST_LOSS_STOP ? "a move is stopped" : "a move goes on to its end", l->arm_idle_s);
+                  l->host_loss == DR_HOST_LOSS_STOP ? "a move is stopped" : "a move goes on to its end", l->arm_idle_s,
+                  (l->rig & DR_RIG_STAYS_ARMED) == 0 ? "when the host closes its port"
+                                                     : "not when the host closes its port at rest");
     (void)fprintf(out, "  unstoppable   moves that ^C does not stop last %u ms at most\n", l->unstoppable_ms);
     for (uint8_t drive = 0; drive < DR_PORTS; drive++)
         print_drive(out, r, drive);

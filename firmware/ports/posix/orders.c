@@ -113,6 +113,8 @@ static cJSON *status_object(const bridge *b, const dr_guard_status *status, cons
     (void)cJSON_AddStringToObject(all, "fault", guard_words_fault(status->fault));
     if (status->fault != DR_FAULT_NONE)
         (void)cJSON_AddStringToObject(all, "fault_says", guard_words_fault_says(status->fault));
+    if (status->state == DR_GUARD_DISARMED && b->disarmed_says != NULL)
+        (void)cJSON_AddStringToObject(all, "disarmed_says", b->disarmed_says);
     if (has(status, DR_NEEDS_DEVICE))
         (void)cJSON_AddStringToObject(all, "device_says", b->device_says);
     add_needs(b, status, all);
@@ -251,6 +253,23 @@ static void continue_clearing(bridge *b, const dr_guard_status *status)
     }
 }
 
+/* Why will it not be armed any more? What was allowed for one time of being armed ends with it. */
+static void watch_arming(bridge *b)
+{
+    dr_guard_status status;
+    dr_guard_get_status(&b->guard, &status);
+    const bool is_armed = status.state >= DR_GUARD_IDLE && status.state <= DR_GUARD_STOPPING;
+    if (is_armed && !b->was_armed)
+        b->disarmed_says = NULL;
+    if (b->was_armed && b->host_left && status.state != DR_GUARD_IDLE)
+        b->disarmed_says = "the host's program has closed the port";
+    if (b->was_armed && status.state == DR_GUARD_DISARMED && b->disarmed_says == NULL)
+        b->disarmed_says = b->log_said ? "the log cannot be written" : "nothing was moved for a while (arm_idle_s)";
+    if (b->was_armed && !is_armed && status.escape)
+        set_input(b, DR_INPUT_ESCAPE, false);
+    b->was_armed = is_armed;
+}
+
 void orders_continue(bridge *b)
 {
     dr_guard_status status;
@@ -267,12 +286,7 @@ void orders_continue(bridge *b)
     }
     if (b->order != ORDER_NONE && b->now_us >= b->order_until_us)
         finish(b, "something is under way: see state");
-    /* What was allowed for one time of being armed ends with it. */
-    dr_guard_get_status(&b->guard, &status);
-    const bool is_armed = status.state >= DR_GUARD_IDLE && status.state <= DR_GUARD_STOPPING;
-    if (b->was_armed && !is_armed && status.escape)
-        set_input(b, DR_INPUT_ESCAPE, false);
-    b->was_armed = is_armed;
+    watch_arming(b);
 }
 
 bool orders_due(const bridge *b, uint64_t *when_us)
@@ -315,6 +329,7 @@ static bool is_log(const char *line, unsigned *count)
 static bool set_at_once(bridge *b, const char *line)
 {
     if (is(line, "disarm")) {
+        b->disarmed_says = "somebody has said so";
         set_input(b, DR_INPUT_KEY, false);
     } else if (is(line, "stop")) {
         dr_guard_input(&b->guard, bridge_now(b), DR_INPUT_STOP, true);
@@ -322,6 +337,7 @@ static bool set_at_once(bridge *b, const char *line)
     } else if (is(line, "confirm")) {
         press(b, DR_INPUT_CONFIRM);
     } else if (is(line, "tip-changed")) {
+        b->disarmed_says = "the tip was changed";
         press(b, DR_INPUT_TIP_CHANGED);
     } else if (is(line, "allow-calibrate")) {
         b->calibrate_until_us = b->now_us + CALIBRATE_LASTS_US;
@@ -379,7 +395,10 @@ static bool is_resting(uint8_t state)
 static void say_state(bridge *b, const dr_guard_status *now)
 {
     const char *const next = next_order(b, now);
-    const char *const says = has(now, DR_NEEDS_DEVICE) ? b->device_says : guard_words_fault_says(now->fault);
+    const char *const says = has(now, DR_NEEDS_DEVICE)     ? b->device_says
+                             : now->fault != DR_FAULT_NONE ? guard_words_fault_says(now->fault)
+                             : now->state == DR_GUARD_DISARMED && b->disarmed_says != NULL ? b->disarmed_says
+                                                                                           : "";
     say("dryrig-guard: %s%s%s\n", guard_words_state(now->state), *says != '\0' ? ": " : "", says);
     if (now->confirm_wanted && now->state == DR_GUARD_IDLE)
         say("  there are no obstacles in %s: only the box protects the objective and the bath\n", b->options->config);

@@ -564,6 +564,7 @@ static void read_facts(reader *r, const config_setting_t *root)
     set_fact(l, DR_RIG_KNOBS_LOCKED, flag(r, root, "knobs_locked", false));
     set_fact(l, DR_RIG_PATHS_UNKNOWN, choice(r, root, "path_model", paths, 0) == 1);
     set_fact(l, DR_RIG_MAY_CALIBRATE, flag(r, root, "allow_calibrate", false));
+    set_fact(l, DR_RIG_STAYS_ARMED, flag(r, root, "stay_armed", false));
 }
 
 static void read_numbers(reader *r, const config_setting_t *root)
@@ -600,8 +601,8 @@ static void read_serial(reader *r, const config_setting_t *root)
 
 #define FOR_ANY                                                                                                        \
     "format", "revision", "profile", "firmware", "converter_serial", "knobs_locked", "path_model", "allow_calibrate",  \
-        "refusal", "on_host_loss", "unstoppable_ms", "arm_idle_s", "margin_um", "knob_um_per_s", "beyond_zero_um",     \
-        "drives", "keepouts"
+        "refusal", "on_host_loss", "stay_armed", "unstoppable_ms", "arm_idle_s", "margin_um", "knob_um_per_s",         \
+        "beyond_zero_um", "drives", "keepouts"
 
 static void read_root(reader *r, const config_setting_t *root)
 {
