@@ -110,9 +110,9 @@ static void fake_ms(unsigned ms)
     }
 }
 
-static void fake_rig(void)
+/* With what the test has added to bench_trio(). */
+static void fake_rig_as_set(void)
 {
-    bench_trio();
     rig.by_hand = true;
     memset(&fake, 0, sizeof fake);
     fake.at[0] = fake.at[1] = fake.at[2] = 40000;
@@ -127,6 +127,12 @@ static void fake_rig(void)
     press(DR_INPUT_ARM);
     fake_ms(150);
     expect_state(DR_GUARD_IDLE);
+}
+
+static void fake_rig(void)
+{
+    bench_trio();
+    fake_rig_as_set();
 }
 
 /* A line of 500 um, of which `ms` have passed. */
@@ -534,6 +540,37 @@ static void row_50_a_hosts_ctrl_c_there_is_passed_on_and_changes_nothing(void)
     expect_silence();
     expect_state(DR_GUARD_IDLE);
     expect_tip(0, 44000, 40000, 40000);
+}
+
+/* Motors that go 20 um too far and come back: the margin has room for it, and the end is where the tip stays. */
+static void row_51_an_overshoot_within_the_margin(void)
+{
+    for (unsigned told_early = 0; told_early < 2; told_early++) { /* the CR after it has come back, or before */
+        bench_trio();
+        const uint8_t wall = keep_out(5551, 5700, 4000, 6000, 4000, 6000); /* the target is as near as it may be */
+        const int32_t wall_q = rig.limits.obstacles[wall].box_q.min_q[DR_X];
+        fake_rig_as_set();
+        fake_move(20);
+        TEST_ASSERT_TRUE(fake.moves);
+        fake.to[0] = 44000 + 160;
+        fake.no_cr = told_early == 0;
+        while (fake.moves)
+            fake_ms(1);
+        TEST_ASSERT_EQUAL(44160, fake.at[0]);
+        TEST_ASSERT_TRUE((int32_t)(fake.at[0] * 8u) < wall_q - UM(30));
+        fake_ms(10);
+        fake.at[0] = 44000;
+        if (told_early == 0)
+            device_says("\r", 1);
+        fake_ms(300);
+        expect_cr();
+        expect_fault(DR_FAULT_NONE);
+        expect_state(DR_GUARD_IDLE);
+        fake.no_cr = false;
+        host_line(8, 44016, 40000, 40000); /* 2 um farther the overshoot has no room */
+        fake_ms(50);
+        expect_refused(DR_REASON_KEEP_OUT);
+    }
 }
 
 static void row_52_real_speeds_are_other_than_documented(void)
@@ -957,6 +994,42 @@ static void a_cable_pulled_within_a_frame_leaves_nothing_that_completes_it(void)
     }
 }
 
+/* Somebody presses HOME, WORK or CENTER at the ROE. In mid-move: the controller goes there instead, and its CR is true of
+ * that. Right behind the end, before the guard has looked: an MPC-200 answers its query when it is home. */
+static void row_61_a_button_of_the_roe_during_a_hosts_move(void)
+{
+    static const uint32_t to[][3] = {{0, 0, 0}, {60000, 20000, 40000}, {100000, 100000, 100000}};
+    for (size_t button = 0; button < sizeof to / sizeof *to; button++) {
+        fake_rig();
+        fake_move(100);
+        expect_state(DR_GUARD_MOVING_S);
+        fake_rest();
+        memcpy(fake.from, fake.at, sizeof fake.at);
+        memcpy(fake.to, to[button], sizeof fake.to);
+        fake.began = rig.now;
+        fake.moves = true;
+        fake_ms(600);
+        expect_fault(DR_FAULT_WRONG_END);
+        expect_state(DR_GUARD_FAULT);
+        expect_silence();
+    }
+    bench_mpc();
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        rig.drives[0].position_steps[axis] = 16000; /* 1 mm from there */
+    bench_start();
+    bench_arm();
+    host_point('M', 17600, 16000, 16000);
+    run_ms(30);
+    while (rig.controller.state == DR_STATE_MOVING)
+        run_us(100);
+    rig.watch_tip = false; /* a hand moves it: no guard can see that */
+    TEST_ASSERT_TRUE(dr_controller_apply(&rig.controller, (dr_us)(rig.clock_at_start + rig.now), DR_EFFECT_HOME, 0));
+    run_ms(3000);
+    expect_fault(DR_FAULT_WRONG_END);
+    expect_silence();
+    TEST_ASSERT_NOT_EQUAL(DR_STATE_MOVING, rig.controller.state);
+}
+
 /* What a board does: it asks after each byte, keeps the answer over the reset, and starts again. */
 static void row_74_a_reset_within_a_frame_leaves_nothing_that_completes_it(void)
 {
@@ -1030,6 +1103,8 @@ int main(void)
     RUN_TEST(the_controller_to_order_works_when_nothing_is_ordered);
     RUN_TEST(row_74_a_reset_within_a_frame_leaves_nothing_that_completes_it);
     RUN_TEST(a_torn_frame_is_remembered_without_limits);
+    RUN_TEST(row_51_an_overshoot_within_the_margin);
+    RUN_TEST(row_61_a_button_of_the_roe_during_a_hosts_move);
     RUN_TEST(row_39_a_lost_cr);
     RUN_TEST(row_40_a_late_cr_is_not_forwarded);
     RUN_TEST(row_41_of_many_crs_one_is_forwarded);

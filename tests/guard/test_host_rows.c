@@ -425,6 +425,36 @@ static void row_31_a_command_while_moving_is_dropped_whole_and_not_done_later(vo
         }
 }
 
+static void row_31_on_a_trio_too(void)
+{
+    static const char codes[] = "SHWxyzhwcCAR";
+    for (int stoppable = 0; stoppable < 2; stoppable++)
+        for (size_t c = 0; c < sizeof codes - 1; c++)
+            for (unsigned ms = 12; ms < 120; ms++) {
+                uint8_t frame[14] = {(uint8_t)codes[c], 37};
+                dr_command command;
+                bench_armed_trio();
+                if (stoppable == 1)
+                    host_line(4, 41600, 40000, 40000); /* 200 um at 1,563 um/s: 128 ms */
+                else
+                    host_axis('x', 44800); /* 600 um at 5 mm/s: 120 ms */
+                run_ms(ms);
+                TEST_ASSERT_EQUAL(stoppable == 1 ? DR_GUARD_MOVING_S : DR_GUARD_MOVING_U, status().state);
+                const uint32_t before = rig.wire_count;
+                const uint8_t angle_deg = rig.controller.angle_deg;
+                TEST_ASSERT_TRUE(dr_command_find(DR_TRIO, DR_FIRMWARE_TRIO, frame[0], &command));
+                host_bytes(frame, 1u + command.args);
+                TEST_ASSERT_EQUAL(before, rig.wire_count);
+                TEST_ASSERT_EQUAL(1, status().refused);
+                run_ms(400);
+                expect_tip(0, stoppable == 1 ? 41600 : 44800, 40000, 40000);
+                TEST_ASSERT_EQUAL(angle_deg, rig.controller.angle_deg); /* row 36: no angle while it moves */
+                expect_cr();
+                expect_silence();
+                TEST_ASSERT_EQUAL(1, status().forwarded);
+            }
+}
+
 static void row_32_a_flood_of_random_bytes(void)
 {
     uint32_t seed = 7;
@@ -628,6 +658,7 @@ int main(void)
     RUN_TEST(row_29_0x03_as_data_is_data);
     RUN_TEST(row_30_fifteen_ctrl_c_running);
     RUN_TEST(row_31_a_command_while_moving_is_dropped_whole_and_not_done_later);
+    RUN_TEST(row_31_on_a_trio_too);
     RUN_TEST(row_32_a_flood_of_random_bytes);
     RUN_TEST(row_33_two_hosts_on_one_port);
     RUN_TEST(row_34_a_frame_in_fourteen_usb_packets);
