@@ -62,8 +62,9 @@ static void happen(dr_guard *g, uint8_t timer, dr_us now)
 static bool earliest(const dr_guard *g, uint8_t *timer)
 {
     bool any = false;
-    for (uint8_t i = 0; i < DR_TIMERS; i++)
-        if (is_running(g, i) && (!any || dr_us_before(g->at[i], g->at[*timer]))) {
+    uint16_t left = g->running;
+    for (uint8_t i = 0; left != 0; i++, left >>= 1)
+        if ((left & 1u) != 0 && (!any || dr_us_before(g->at[i], g->at[*timer]))) {
             *timer = i;
             any = true;
         }
@@ -99,7 +100,7 @@ static bool is_between_bytes(const dr_guard *g)
 static void end(dr_guard *g, dr_us now)
 {
     dr_g_show_state(g, now);
-    if (is_between_bytes(g))
+    if (g->stops_out == 0 && is_between_bytes(g)) /* nor while a ^C waits to be pulled */
         dr_g_seal(g);
 }
 

@@ -138,8 +138,9 @@ static const uint8_t *get_struct(const uint8_t *image, const field *fields, size
     for (size_t i = 0; i < count; i++)
         for (uint8_t n = 0; n < fields[i].count; n++) {
             uint64_t value = 0;
-            for (uint8_t byte = 0; byte < fields[i].size; byte++)
-                value |= (uint64_t)*image++ << (8u * byte);
+            for (uint8_t byte = fields[i].size; byte > 0; byte--)
+                value = value << 8 | image[byte - 1u];
+            image += fields[i].size;
             store((uint8_t *)out + fields[i].offset + (size_t)n * fields[i].size, fields[i].size, value);
         }
     return image;

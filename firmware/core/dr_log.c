@@ -36,7 +36,7 @@ void dr_log_init(dr_log *log, dr_record *ring, uint16_t size)
     *log = (dr_log){ring, ring == NULL ? (uint16_t)0 : size, 0, 0, 0, 0, 0};
 }
 
-/* A record is chained when it leaves: whoever puts one in must not wait for that. */
+/* A record is chained when it leaves: nothing waits for that while a stop is under way. */
 static void chain(dr_log *log, dr_record *oldest) { oldest->crc = log->crc = dr_record_crc(log->crc, oldest); }
 
 static dr_record *drop_oldest(dr_log *log)

@@ -12,6 +12,7 @@
 #endif
 
 #define STOPS (1u << DR_INPUT_STOP | 1u << DR_INPUT_STOP_2)
+#define PRESSES (1u << DR_INPUT_ARM | 1u << DR_INPUT_TIP_CHANGED | 1u << DR_INPUT_CONFIRM)
 #define HOST_IS_OPEN (1u << 9)
 enum { BUZZER = 1u << 0, LAMP = 1u << 1, RELAY = 1u << 2 };
 
@@ -113,7 +114,7 @@ static void look_at_inputs(dr_us now)
             dr_guard_input(&b.guard, now, (dr_input)input, (on >> input & 1u) != 0);
     if ((changed & HOST_IS_OPEN) != 0)
         dr_guard_link(&b.guard, now, (on & HOST_IS_OPEN) != 0, b.has_limits);
-    b.confirmed = b.confirmed || (on & 1u << DR_INPUT_CONFIRM) != 0;
+    b.confirmed = b.confirmed || (changed & on & 1u << DR_INPUT_CONFIRM) != 0;
 }
 
 static bool lamp(const dr_guard_status *status, dr_us now)
@@ -278,15 +279,18 @@ void dr_bridge_begin(void)
     dr_port_line_open(DR_LINE_HOST, baud);
     if (b.has_limits)
         dr_port_line_open(DR_LINE_DEVICE, baud);
+    const uint16_t levels = (uint16_t)(dr_port_inputs() ^ STOPS);
+    dr_contacts_init(&b.contacts, levels);
+    b.told = levels & PRESSES; /* what is held at the start must be let go before it is a press */
+    dr_guard_init(&b.guard, b.has_limits ? &b.limits : NULL, b.records, BRIDGE_RECORDS);
 
     const dr_us now = b.looked = b.round = dr_port_now_us();
-    dr_contacts_init(&b.contacts, (uint16_t)(dr_port_inputs() ^ STOPS));
-    dr_guard_init(&b.guard, b.has_limits ? &b.limits : NULL, b.records, BRIDGE_RECORDS);
     dr_guard_start(&b.guard, now, how_it_ended());
     dr_guard_link(&b.guard, now, false, b.has_limits); /* a UART cannot tell who is there: the proof of identity will */
     if (doubtful) {                                    /* these limits may not be the newest: CONFIRM before ARM */
         dr_guard_input(&b.guard, now, DR_INPUT_TIP_CHANGED, true);
         dr_guard_input(&b.guard, now, DR_INPUT_TIP_CHANGED, false);
     }
+    send_device(now); /* after a reset: ^C */
     dr_port_watchdog_start();
 }

@@ -9,6 +9,9 @@
  *         the rate the board has set; "US low PIN..." connects these pins of the chip to ground from then on, "US open
  *         PIN..." no longer; "US stop" ends the run, "US off" cuts the power there. Prints "US HEX" for each byte that the
  *         board sends: the moment it is whole on the line. The same run gives the same output, to the cycle.
+ *     avr_board --controller trio|mpc ...
+ *         A board that is a bridge: UART 1 goes to an emulated controller (avr_controller.h). In a script "US hang" lets the
+ *         program stand still for 0.2 s, "US flip HEX..." flips a bit in RAM, where these bytes are found first.
  *     avr_board --program MCU IMAGE.elf
  *         Runs a program to its end (sleep without interrupts); prints what it writes to UART 0; exits with its GPIOR0.
  *
@@ -31,6 +34,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "avr_controller.h"
+
 #include <simavr/avr_eeprom.h>
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_uart.h>
@@ -41,7 +46,6 @@
 #include <simavr/sim_irq.h>
 
 #define HZ 16000000u
-#define CYCLES_PER_US 16u
 #define SLICE_CYCLES 8000u  /* 0.5 ms between looks at the outside */
 #define FRAME_CYCLES 16000u /* a USB frame, 1 ms */
 
@@ -293,6 +297,7 @@ static void exchange(void)
         usb_exchange();
     else
         uart_push();
+    avr_controller_exchange();
 }
 
 /* -- The line as a pseudo-terminal --------------------------------------------------------------------------------- */
@@ -346,10 +351,12 @@ static void serve(const char *link_path, bool flat_out)
 
 /* -- Pins ------------------------------------------------------------------------------------------------------------ */
 
+static uint8_t grounded[128]; /* by the port's letter */
+static const char *watched = "";
+
 /* Connects the pins that are named there to ground, or leaves them to their pull-ups. */
 static void connect_pins(const char *pins, bool to_ground)
 {
-    static uint8_t grounded[128]; /* by the port's letter */
     while (*pins == ' ')
         pins++;
     for (; pins[0] >= 'A' && pins[0] <= 'L' && pins[1] >= '0' && pins[1] <= '7'; pins += 2) {
@@ -372,16 +379,78 @@ static void pin_changes(avr_irq_t *irq, uint32_t value, void *name)
                      value & 1u);
 }
 
-static void watch_pins(const char *pins)
+static void watch_pins(void)
 {
-    for (; pins[0] != '\0' && pins[1] != '\0'; pins += 2) {
+    for (const char *pins = watched; pins[0] != '\0' && pins[1] != '\0'; pins += 2) {
         const uint32_t port = (uint8_t)pins[0];
         avr_irq_t *pin = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), pins[1] - '0');
         avr_irq_register_notify(pin, pin_changes, (void *)(uintptr_t)pins);
     }
 }
 
+/* simavr forgets the pull-ups at a reset. */
+static void pull_up_pins(void)
+{
+    for (char port = 'A'; port <= 'L'; port++)
+        for (char bit = '0'; bit <= '7'; bit++) {
+            const char name[] = {port, bit, '\0'};
+            avr_irq_t *const irq = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), bit - '0');
+            if (irq != NULL && strstr(watched, name) == NULL && (grounded[(uint8_t)port] >> (bit - '0') & 1) == 0) {
+                avr_raise_irq(irq, 0);
+                avr_raise_irq(irq, 1);
+            }
+        }
+}
+
 /* -- The line as a script ------------------------------------------------------------------------------------------ */
+
+static void play_until(avr_cycle_count_t when)
+{
+    while (avr->cycle < when && !ended) {
+        run_until(avr->cycle + FRAME_CYCLES / 8u < when ? avr->cycle + FRAME_CYCLES / 8u : when);
+        exchange();
+    }
+}
+
+/* The instruction that comes next jumps to itself for a while. */
+static void hang(void)
+{
+    uint8_t was[2], *const next = avr->flash + avr->pc;
+    memcpy(was, next, sizeof was);
+    const avr_flashaddr_t at = avr->pc;
+    const avr_cycle_count_t end = avr->cycle + HZ / 5u;
+    memcpy(next, "\xFF\xCF", sizeof was);
+    while (avr->pc == at && avr->cycle < end)
+        play_until(avr->cycle + 1);
+    pull_up_pins();
+    play_until(end);
+    memcpy(next, was, sizeof was);
+}
+
+static size_t read_bytes(const char *text, uint8_t *bytes, size_t room)
+{
+    size_t count = 0;
+    for (char *next; count < room; text = next) {
+        const unsigned long byte = strtoul(text, &next, 16);
+        if (next == text)
+            break;
+        bytes[count++] = (uint8_t)byte;
+    }
+    return count;
+}
+
+static void flip_bit(const char *text)
+{
+    uint8_t bytes[64];
+    const size_t count = read_bytes(text, bytes, sizeof bytes);
+    for (uint8_t *at = avr->data + avr->ioend + 1u; at + count <= avr->data + avr->ramend; at++)
+        if (memcmp(at, bytes, count) == 0) {
+            *at ^= 1u;
+            return;
+        }
+    errno = 0;
+    fail("RAM does not hold the bytes to flip");
+}
 
 static void play(FILE *script)
 {
@@ -393,10 +462,7 @@ static void play(FILE *script)
         const avr_cycle_count_t when = strtoull(line, &rest, 10) * CYCLES_PER_US;
         if (rest == line)
             continue; /* a comment */
-        while (avr->cycle < when && !ended) {
-            run_until(avr->cycle + FRAME_CYCLES / 8u < when ? avr->cycle + FRAME_CYCLES / 8u : when);
-            exchange();
-        }
+        play_until(when);
         if (strstr(rest, "stop") != NULL || strstr(rest, "off") != NULL)
             return;
         char *low = strstr(rest, "low"), *open = strstr(rest, "open");
@@ -404,14 +470,19 @@ static void play(FILE *script)
             connect_pins(low != NULL ? low + strlen("low") : open + strlen("open"), low != NULL);
             continue;
         }
-        for (char *at = rest;;) {
-            char *next;
-            const unsigned long byte = strtoul(at, &next, 16);
-            if (next == at)
-                break;
-            put(&to_board, (uint8_t)byte);
-            at = next;
+        const char *const flip = strstr(rest, "flip");
+        if (flip != NULL) {
+            flip_bit(flip + strlen("flip"));
+            continue;
         }
+        if (strstr(rest, "hang") != NULL) {
+            hang();
+            continue;
+        }
+        uint8_t bytes[sizeof line / 2u];
+        const size_t count = read_bytes(rest, bytes, sizeof bytes);
+        for (size_t i = 0; i < count; i++)
+            put(&to_board, bytes[i]);
         exchange();
     }
     errno = 0;
@@ -475,8 +546,9 @@ int main(int argc, char **argv)
                                             {"program", no_argument, NULL, 'p'},
                                             {"low", required_argument, NULL, 'g'},
                                             {"watch", required_argument, NULL, 'w'},
+                                            {"controller", required_argument, NULL, 'c'},
                                             {NULL, 0, NULL, 0}};
-    const char *low = "", *watched = "", *memory_path = NULL, *link_path = NULL, *script_path = NULL;
+    const char *low = "", *controller = NULL, *memory_path = NULL, *link_path = NULL, *script_path = NULL;
     bool flat_out = false, is_program = false;
     for (int option; (option = getopt_long(argc, argv, "", options, NULL)) != -1;)
         switch (option) {
@@ -501,6 +573,9 @@ int main(int argc, char **argv)
         case 'w':
             watched = optarg;
             break;
+        case 'c':
+            controller = optarg;
+            break;
         case 'p':
             is_program = true;
             break;
@@ -513,7 +588,9 @@ int main(int argc, char **argv)
              "IMAGE.elf");
     load(argv[optind], argv[optind + 1]);
     connect_pins(low, true);
-    watch_pins(watched);
+    watch_pins();
+    if (controller != NULL && !avr_controller_begin(avr, controller, script_path != NULL))
+        fail("--controller trio or --controller mpc");
     if (memory_path != NULL)
         memory(memory_path, false);
     (void)signal(SIGTERM, stop);
@@ -540,6 +617,7 @@ int main(int argc, char **argv)
     } else {
         serve(link_path, flat_out);
     }
+    avr_controller_end();
     (void)fprintf(stderr, "avr_board: stack %u bytes, %llu cycles\n", avr->ramend - deepest_sp,
                   (unsigned long long)avr->cycle);
     if (memory_path != NULL)
