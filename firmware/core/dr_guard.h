@@ -227,7 +227,8 @@ typedef struct {
     dr_verdict last_refusal;
     uint32_t forwarded, refused, dropped_bytes, quarantined_bytes;
 
-    uint32_t seal; /* over all of the above, while nothing is arriving or leaving */
+    uint8_t word_end[3]; /* 0: completes the last word where the struct is packed by bytes */
+    uint32_t seal;       /* over all of the above, while nothing is arriving or leaving */
     uint8_t sealed;
 } dr_guard;
 

@@ -920,9 +920,23 @@ static void a_rig_may_stay_armed_between_two_hosts(void)
     expect_state(DR_GUARD_DISARMED);
 }
 
+/* Whichever side is asked: what is due has happened. */
+static void who_asks_for_the_hosts_bytes_settles_what_is_due(void)
+{
+    uint8_t byte;
+    bench_trio();
+    rig.limits.arm_idle_s = 1;
+    bench_start();
+    bench_arm();
+    rig.now += 2000000;
+    TEST_ASSERT_EQUAL(0, dr_guard_pull_host(&rig.guard, guard_clock(), &byte, 1));
+    expect_state(DR_GUARD_DISARMED);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(who_asks_for_the_hosts_bytes_settles_what_is_due);
     RUN_TEST(an_ignored_move_forgets_no_old_target);
     RUN_TEST(the_hosts_choice_of_a_drive_outlives_arming);
     RUN_TEST(a_cable_pulled_right_behind_a_frame_may_have_torn_it);

@@ -101,7 +101,7 @@ static uint32_t motion_bytes_since(uint32_t from)
  * nothing more of a motion leaves. */
 static void row_72_every_flipped_bit_of_the_guards_memory_is_found(void)
 {
-    const size_t bits = offsetof(dr_guard, seal) * 8;
+    const size_t bits = offsetof(dr_guard, word_end) * 8;
     uint32_t found = 0;
     for (int kind = DR_TRIO; kind <= DR_MPC; kind++)
         for (int state = AT_LOCKED; state < STATES; state++) {
@@ -153,6 +153,26 @@ static void row_72_damage_stops_what_moves_and_completes_nothing(void)
         TEST_ASSERT_EQUAL(state == AT_MOVING ? 2 : 0, wire_stops() - stops);
         TEST_ASSERT_NOT_EQUAL(DR_STATE_MOVING, rig.controller.state);
         TEST_ASSERT_EQUAL(0, motion_bytes_since(wire));
+    }
+}
+
+/* Whoever forgets that a frame was torn would complete it. */
+static void row_72_a_flipped_bit_does_not_forget_a_torn_frame(void)
+{
+    for (unsigned bit = 0; bit < 8; bit++) {
+        TEST_ASSERT_TRUE(bring_to(DR_MPC, AT_PAUSE));
+        const uint32_t wire = rig.wire_count;
+        cables(true, false);
+        cables(true, true);
+        expect_fault(DR_FAULT_TORN);
+        rig.is_damaged = true;
+        rig.guard.torn ^= (uint8_t)(1u << bit);
+        for (int i = 0; i < 20; i++)
+            host_code(3);
+        run_ms(1000);
+        expect_fault(DR_FAULT_DAMAGED);
+        TEST_ASSERT_TRUE(status().confirm_wanted);
+        TEST_ASSERT_EQUAL(wire, rig.wire_count);
     }
 }
 
@@ -320,6 +340,7 @@ int main(int argc, char **argv)
     UNITY_BEGIN();
     RUN_TEST(row_72_every_flipped_bit_of_the_guards_memory_is_found);
     RUN_TEST(row_72_damage_stops_what_moves_and_completes_nothing);
+    RUN_TEST(row_72_a_flipped_bit_does_not_forget_a_torn_frame);
     RUN_TEST(row_72_a_flipped_seal);
     RUN_TEST(row_21_every_flipped_bit_of_a_corpus_where_it_is_armed);
     RUN_TEST(row_21_every_flipped_bit_of_a_corpus_in_all_other_states);
