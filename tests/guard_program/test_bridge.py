@@ -179,6 +179,37 @@ class Stopping(unittest.TestCase):
             told = follower.answer()
         return told
 
+    def test_followers_are_not_told_of_queries(self):
+        with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, port), Channel(g.socket) as follower:
+            follower.order("follow")
+            for _ in range(50):
+                self.assertEqual(len(port.ask(b"C", 14)), 14)
+            g.order("disarm")
+            told = follower.answer()
+            if told["state"] == "armed": # the end of the query that was under way when following began
+                told = follower.answer()
+            self.assertEqual((told["state"], told["disarmed_says"]), ("disarmed", "somebody has said so"))
+
+    def test_a_stop_from_another_thread_within_the_frame(self):
+        """acq4 writes it while its move thread sleeps behind the S and its speed."""
+        frame = line(0, 2000, 0, 0)
+        with guarded("mpc", rig(guard.MPC)) as (_, g, port):
+            port.send(frame[:2])
+            guard.pause(0.015)
+            port.send(b"\x03")
+            guard.pause(0.015)
+            port.send(frame[2:])
+            emu.wait_until(lambda: g.status()["dropped_bytes"] + g.status()["refused"] > 0, "the shifted frame to be refused")
+            self.assertEqual(g.status()["forwarded"], 0)
+            guard.pause(0.2) # as a person does before the next try
+            self.assertEqual(port.ask(line(15, 10, 0, 0), 1), b"\r")
+            self.moving(g, port)
+            port.send(frame[:2]) # and while it moves: the next command is begun, and stopped within
+            port.send(b"\x03")
+            self.assertEqual(port.receive(1), b"\r")
+            g.wait_for("armed")
+            self.at_rest(port)
+
     def test_a_rig_whose_guard_stays_armed(self):
         with guarded("mpc", rig(guard.MPC, more="stay_armed = true;")) as (_, g, port):
             port.close()

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
 
 #define ANSWER_LIMIT_S 15 /* an order takes 5 s at most */
@@ -35,6 +36,16 @@ static void print_position(const cJSON *position)
                  cJSON_GetNumberValue(cJSON_GetArrayItem(um, 2)));
 }
 
+/* What follows is the news of this time. */
+static void print_time(void)
+{
+    const time_t now = time(NULL);
+    struct tm parts;
+    char text[16] = "";
+    if (localtime_r(&now, &parts) != NULL && strftime(text, sizeof text, "%H:%M:%S", &parts) > 0)
+        (void)printf("\n%s\n", text);
+}
+
 static void print_status(const cJSON *all, const char *path)
 {
     const cJSON *one;
@@ -49,6 +60,12 @@ static void print_status(const cJSON *all, const char *path)
     cJSON_ArrayForEach(one, cJSON_GetObjectItemCaseSensitive(all, "needs"))(void)
         printf("needs:    %s: %s\n", text_of(one, "need"), text_of(one, "says"));
     print_position(cJSON_GetObjectItemCaseSensitive(all, "position"));
+    if (is_true(all, "in_tissue"))
+        (void)printf("surface:  on: only straight lines along the approach pass\n");
+    if (is_true(all, "escape"))
+        (void)printf("escape:   on: only lines that lead out of what is forbidden, 1 mm at most\n");
+    if (is_true(all, "may_calibrate"))
+        (void)printf("calibration: may start now\n");
     const cJSON *const refusal = cJSON_GetObjectItemCaseSensitive(all, "last_refusal");
     if (cJSON_IsObject(refusal))
         (void)printf("refused:  '%s': %s\n", text_of(refusal, "command"), text_of(refusal, "says"));
@@ -64,7 +81,7 @@ static void print_log(const cJSON *list)
 }
 
 /* Returns the exit status that the answer stands for. */
-static int tell(const char *line, const char *path, bool is_json)
+static int tell(const char *line, const char *path, bool follows, bool is_json)
 {
     cJSON *const all = cJSON_Parse(line);
     const bool done = all != NULL && is_true(all, "ok");
@@ -74,6 +91,8 @@ static int tell(const char *line, const char *path, bool is_json)
         (void)fprintf(stderr, "dryrig-guard: %s: no answer of a guard\n", path);
     } else {
         const cJSON *const list = cJSON_GetObjectItemCaseSensitive(all, "log");
+        if (follows)
+            print_time();
         if (*text_of(all, "state") != '\0')
             print_status(all, path);
         print_log(list);
@@ -122,7 +141,7 @@ int ctl_run(const char *path, const char *order, bool follows, bool is_json)
     (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
     if (fprintf(guard, "%s\n", order) > 0 && fflush(guard) == 0)
         while (getline(&line, &room, guard) > 0) {
-            status = tell(line, path, is_json);
+            status = tell(line, path, follows, is_json);
             if (!follows)
                 break;
         }

@@ -88,20 +88,38 @@ static void print_drive(FILE *out, const rig *r, uint8_t drive)
     print_surface(out, l, drive);
 }
 
+/* Along an axis as "Z from 19,500.0 um"; else as what holds for its points. */
+static void print_half(FILE *out, const dr_half *half)
+{
+    char a[32];
+    unsigned axes = 0, axis = 0;
+    for (unsigned i = 0; i < DR_AXES; i++)
+        if (half->normal[i] != 0) {
+            axes++;
+            axis = i;
+        }
+    const int normal = half->normal[axis];
+    if (axes == 1 && half->offset_q % normal == 0)
+        (void)fprintf(out, "%c %s %s um", axis_names[axis], normal < 0 ? "from" : "up to",
+                      um(a, half->offset_q / normal));
+    else
+        (void)fprintf(out, "all points where %d X %+d Y %+d Z is at most %s um", half->normal[DR_X], half->normal[DR_Y],
+                      half->normal[DR_Z], um(a, half->offset_q));
+}
+
 static void print_obstacles(FILE *out, const rig *r)
 {
     char a[32];
     const dr_limits *const l = &r->limits;
-    (void)fprintf(out, "\nobstacles (grown by %s um when a way is checked, and by what a knob may do meanwhile): %s\n",
-                  um(a, l->margin_q), l->obstacle_count == 0 ? "none" : "");
+    (void)fprintf(out, "\nobstacles (grown by %s um when a way is checked, and by what a knob may do meanwhile)%s\n",
+                  um(a, l->margin_q), l->obstacle_count == 0 ? ": none" : "");
     for (uint8_t i = 0; i < l->obstacle_count; i++) {
         const dr_obstacle *const o = &l->obstacles[i];
         (void)fprintf(out, "  \"%s\", drive %u: ", r->names[i], o->drive + 1u);
         if (o->shape == DR_SHAPE_BOX)
             print_box(out, &o->box_q);
         else
-            (void)fprintf(out, "all on the side away from (%d, %d, %d)", o->half_q.normal[DR_X], o->half_q.normal[DR_Y],
-                          o->half_q.normal[DR_Z]);
+            print_half(out, &o->half_q);
         (void)fprintf(out, "; way out: %s\n",
                       o->shape == DR_SHAPE_HALF ? "along it"
                       : o->exit == DR_TO_NONE   ? "by hand only"

@@ -222,7 +222,8 @@ size_t guard_words_verdict(char *out, size_t room, const rig *r, const dr_verdic
     const char *const item = item_name(r, v->item);
     if (item != NULL)
         return (size_t)snprintf(out, room, "%s: %s", says, item);
-    if (v->axis < DR_AXES && v->reason != DR_REASON_HIDDEN) /* that is about the place, not about an axis */
+    const bool is_of_axis = v->reason != DR_REASON_HIDDEN && v->reason != DR_REASON_AMBIGUOUS;
+    if (v->axis < DR_AXES && is_of_axis)
         return (size_t)snprintf(out, room, "%c: %s", axes[v->axis], says);
     return (size_t)snprintf(out, room, "%s", says);
 }

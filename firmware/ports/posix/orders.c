@@ -379,17 +379,22 @@ void orders_take(void *context, control_client *who, const char *line)
 
 /* -- Telling people ---------------------------------------------------------------------------------------------------- */
 
-static bool is_same(const dr_guard_status *a, const dr_guard_status *b)
-{
-    return a->state == b->state && a->fault == b->fault && a->needs == b->needs && a->refused == b->refused &&
-           a->confirm_wanted == b->confirm_wanted && a->in_tissue == b->in_tissue && a->escape == b->escape &&
-           a->may_calibrate == b->may_calibrate && a->buzzer == b->buzzer;
-}
-
 static bool is_resting(uint8_t state)
 {
     return state == DR_GUARD_LOCKED || state == DR_GUARD_DISARMED || state == DR_GUARD_IDLE ||
            state == DR_GUARD_FAULT || state == DR_GUARD_STOPPED;
+}
+
+/* Is there nothing new for people? Every query and motion is "under way" for a moment: that alone is no news. */
+static bool is_same(const dr_guard_status *now, const dr_guard_status *told)
+{
+    uint16_t needs = now->needs;
+    if (is_resting(now->state) && !has(told, DR_NEEDS_REST))
+        needs = (uint16_t)(needs & ~(unsigned)DR_NEEDS_REST);
+    return now->state == told->state && now->fault == told->fault && needs == told->needs &&
+           now->refused == told->refused && now->confirm_wanted == told->confirm_wanted &&
+           now->in_tissue == told->in_tissue && now->escape == told->escape &&
+           now->may_calibrate == told->may_calibrate && now->buzzer == told->buzzer;
 }
 
 static void say_state(bridge *b, const dr_guard_status *now)
