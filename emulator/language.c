@@ -32,7 +32,10 @@ bool telling_wrong(telling *t, const char *format, ...)
 
 bool telling_ends(telling *t)
 {
-    return t->words[t->at] == NULL || telling_wrong(t, "'%s' is one word too many", t->words[t->at]);
+    if (t->words[t->at] != NULL)
+        return telling_wrong(t, "'%s' is one word too many", t->words[t->at]);
+    t->was_read = true;
+    return !t->is_check;
 }
 
 /* What a value's reader says, behind the word that it is about. */
@@ -122,12 +125,34 @@ bool telling_later(telling *t, uint64_t when_us, const char *line, bool is_passi
     return true;
 }
 
+static bool carry_out_words(telling *t);
+
+/* Is what stands there a command? */
+static bool is_rest_right(telling *t)
+{
+    telling rest = *t;
+    if (t->words[t->at] == NULL)
+        return telling_wrong(t, "and then? Another command is expected behind it");
+    rest.is_check = rest.is_later = true;
+    (void)carry_out_words(&rest);
+    if (rest.was_read)
+        return true;
+    t->at = rest.at;
+    t->has_usage = rest.has_usage;
+    memcpy(t->why, rest.why, sizeof t->why);
+    return false;
+}
+
 /* The rest of the line as it was, for the same controller. */
 static bool rest_of(telling *t, char line[LANGUAGE_LINE])
 {
-    size_t length = t->s == NULL ? 0 : (size_t)snprintf(line, LANGUAGE_LINE, "@%s", t->s->name);
-    if (t->words[t->at] == NULL)
-        return telling_wrong(t, "and then? Another command is expected behind it");
+    if (!is_rest_right(t))
+        return false;
+    const bool is_named = t->words[t->at][0] == '@';
+    size_t length = t->s == NULL || is_named ? 0 : (size_t)snprintf(line, LANGUAGE_LINE, "@%s", t->s->name);
+    t->was_read = true;
+    if (t->is_check)
+        return false;
     for (const char *word; (word = telling_next(t)) != NULL && length < LANGUAGE_LINE;)
         length += (size_t)snprintf(line + length, LANGUAGE_LINE - length, "%s%s", length > 0 ? " " : "", word);
     return length < LANGUAGE_LINE || telling_wrong(t, "the line is too long");
@@ -237,9 +262,11 @@ static const verb *find(const char *name)
 static bool do_help(telling *t)
 {
     const char *const name = telling_next(t);
-    cJSON *const list = cJSON_AddArrayToObject(t->answer, "commands");
     if (name != NULL && find(name) == NULL)
         return telling_wrong(t, "'%s' is no verb; 'help' lists them", name);
+    if (!telling_ends(t))
+        return false;
+    cJSON *const list = cJSON_AddArrayToObject(t->answer, "commands");
     for (size_t i = 0; i < TABLES; i++)
         for (const verb *v = tables[i]; v->name != NULL; v++) {
             if (name != NULL && v != find(name))
@@ -251,7 +278,7 @@ static bool do_help(telling *t)
             (void)cJSON_AddStringToObject(entry, "does", v->help);
             (void)cJSON_AddItemToArray(list, entry);
         }
-    return telling_ends(t);
+    return true;
 }
 
 /* -- A line -------------------------------------------------------------------------------------------------------------- */
@@ -270,34 +297,77 @@ static bool cut(telling *t, char *line)
 static bool choose_station(telling *t)
 {
     engine *const e = t->l->e;
-    t->s = e->station_count == 1 ? &e->stations[0] : NULL;
-    if (t->words[0] == NULL || t->words[0][0] != '@')
+    const char *const word = t->words[t->at];
+    if (t->s == NULL && e->station_count == 1)
+        t->s = &e->stations[0];
+    if (word == NULL || word[0] != '@')
         return true;
+    t->at++;
     for (unsigned i = 0; i < e->station_count; i++)
-        if (strcmp(e->stations[i].name, t->words[0] + 1) == 0) {
+        if (strcmp(e->stations[i].name, word + 1) == 0) {
             t->s = &e->stations[i];
-            t->at = 1;
-            return t->words[1] != NULL || telling_wrong(t, "and what about '%s'?", t->words[0] + 1);
+            return t->words[t->at] != NULL || telling_wrong(t, "and what about '%s'?", word + 1);
         }
-    return telling_wrong(t, "there is no controller '%s'", t->words[0] + 1);
+    t->at--;
+    return telling_wrong(t, "there is no controller '%s'", word + 1);
 }
 
-static bool carry_out(telling *t, char *line)
+static bool carry_out_words(telling *t)
 {
-    if (!cut(t, line) || !choose_station(t))
+    if (!choose_station(t))
         return false;
     const char *const name = telling_next(t);
     const verb *const v = find(name);
     if (v == NULL)
         return telling_wrong(t, "'%s' is no verb; 'help' lists them", name);
-    if (v->needs_one && t->s == NULL && t->l->e->station_count > 1)
+    if (v->needs_one && t->s == NULL && t->l->e->station_count > 1) {
+        t->at--;
         return telling_wrong(t, "which controller? Write @%s before it, or another one's name",
                              t->l->e->stations[0].name);
+    }
     if (v->carry_out(t))
         return true;
     const size_t length = strlen(t->why);
-    if (length < sizeof t->why)
-        (void)snprintf(t->why + length, sizeof t->why - length, " (%s %s)", v->name, v->usage);
+    if (length < sizeof t->why && !t->has_usage)
+        (void)snprintf(t->why + length, sizeof t->why - length, " (%s%s%s)", v->name, *v->usage == '\0' ? "" : " ",
+                       v->usage);
+    t->has_usage = true;
+    return false;
+}
+
+static bool carry_out(telling *t, char *line) { return cut(t, line) && carry_out_words(t); }
+
+/* The word that is wrong: it is quoted where it has been taken, else it is the one that comes next. */
+static unsigned column_of_wrong(const telling *t, const char *text, size_t length)
+{
+    for (unsigned back = 0; back < 2 && back <= t->at; back++) {
+        const char *const word = t->words[t->at - back];
+        if (word != NULL && t->why[0] == '\'' && strncmp(t->why + 1, word, strlen(word)) == 0 &&
+            t->why[1 + strlen(word)] == '\'')
+            return (unsigned)(word - text) + 1u;
+    }
+    return t->words[t->at] != NULL ? (unsigned)(t->words[t->at] - text) + 1u : (unsigned)length + 1u;
+}
+
+bool language_check(language *l, const char *line, char why[WHY_ROOM], unsigned *column)
+{
+    telling t;
+    char text[LANGUAGE_LINE];
+    memset(&t, 0, sizeof t);
+    t.l = l;
+    t.is_check = true;
+    if ((size_t)snprintf(text, sizeof text, "%s", line) >= sizeof text) {
+        *column = LANGUAGE_LINE;
+        (void)snprintf(why, WHY_ROOM, "the line is longer than %u characters", LANGUAGE_LINE - 1u);
+        return false;
+    }
+    t.answer = cJSON_CreateObject();
+    (void)carry_out(&t, text);
+    cJSON_Delete(t.answer);
+    if (t.was_read)
+        return true;
+    *column = column_of_wrong(&t, text, strcspn(line, "\r\n"));
+    memcpy(why, t.why, sizeof t.why);
     return false;
 }
 

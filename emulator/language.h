@@ -24,7 +24,11 @@ typedef struct {
     const char *words[LANGUAGE_WORDS + 1]; /* NULL behind the last */
     unsigned at;                           /* the word that is looked at */
     cJSON *answer;
-    bool follows; /* the asker wants to be told what happens from now on */
+    bool follows;  /* the asker wants to be told what happens from now on */
+    bool is_check; /* it is read, and not carried out */
+    bool is_later; /* it stands behind `at`, `in`, `after` or `on` */
+    bool was_read; /* to its end, and nothing is wrong with it as it stands there */
+    bool has_usage;
     char why[WHY_ROOM];
 } telling;
 
@@ -45,6 +49,9 @@ struct language {
 
 /* Carries out a line. {"ok":true, ...} or {"ok":false,"why":"..."}; the caller deletes it. *follows may be NULL. */
 cJSON *language_do(language *l, const char *line, bool *follows);
+/* Could a line be carried out? What the controllers are by then counts for nothing: 'power on' is right while it is on. False:
+ * why[] says what was expected, at the character of that number (from 1). */
+bool language_check(language *l, const char *line, char why[WHY_ROOM], unsigned *column);
 /* Takes what waits for its time or its command back. */
 void language_close(language *l);
 
@@ -54,7 +61,8 @@ void language_close(language *l);
 const char *telling_next(telling *t);
 /* Is the next word this one? Then it is taken. */
 bool telling_take(telling *t, const char *word);
-/* Nothing may follow. */
+/* The line has been read, and nothing may follow. False also where it is only to be checked. So a verb first reads all of its
+ * words, then comes this, then what depends on how things are, then it acts. */
 bool telling_ends(telling *t);
 /* t->why, and false. */
 __attribute__((format(printf, 2, 3))) bool telling_wrong(telling *t, const char *format, ...);

@@ -15,6 +15,7 @@
 #include "playback.h" /* the controller's side of a recording, for a host */
 #include "record.h"   /* the bytes of the line, kept */
 #include "replay.h"   /* and played again */
+#include "script.h"   /* scenarios */
 #include "terminal.h" /* leaving it as it was */
 #include "trace.h"    /* what happens, in words */
 
@@ -41,6 +42,8 @@ typedef struct {
     trace trace;
     observer_link *trace_links;
     desk desk;
+    script *scripts; /* scenarios, in the order in which they are done */
+    unsigned script_count;
     lint lint;
     observer_link *lint_links;
     FILE *lint_json, *lint_junit;
@@ -254,7 +257,9 @@ static bool set_up(program *p)
     p->trace_links = calloc(o->rig.count, sizeof *p->trace_links);
     p->lint_links = calloc(o->rig.count, sizeof *p->lint_links);
     p->record_links = calloc(o->rig.count, sizeof *p->record_links);
-    if (e->stations == NULL || p->trace_links == NULL || p->lint_links == NULL || p->record_links == NULL)
+    p->scripts = calloc(o->rig.count + 1u, sizeof *p->scripts);
+    if (e->stations == NULL || p->trace_links == NULL || p->lint_links == NULL || p->record_links == NULL ||
+        p->scripts == NULL)
         return false;
     for (unsigned i = 0; i < e->station_count; i++) {
         station *const s = &e->stations[i];
@@ -340,22 +345,92 @@ static void report_lint(program *p)
     lint_close(&p->lint);
 }
 
-/* What stands in the rig file, then --do. */
+/* -- What is done at the start ------------------------------------------------------------------------------------------- */
+
+static bool open_script(program *p, const char *path, const char *whose)
+{
+    char why[PATH_ROOM + 256];
+    if (path == NULL || script_open(&p->scripts[p->script_count], path, whose, why, sizeof why)) {
+        p->script_count += path != NULL;
+        return true;
+    }
+    (void)fprintf(stderr, "dryrig-emu: %s\n", why);
+    return false;
+}
+
+static void do_line(const program *p, unsigned member, unsigned n, char line[LANGUAGE_LINE])
+{
+    (void)snprintf(line, LANGUAGE_LINE, "@%s %s", p->o->rig.members[member].name, p->o->rig.members[member].do_[n]);
+}
+
+static bool check_line(language *l, const char *line)
+{
+    char why[WHY_ROOM];
+    unsigned column;
+    if (language_check(l, line, why, &column))
+        return true;
+    (void)fprintf(stderr, "dryrig-emu: '%s': %s\n", line, why);
+    return false;
+}
+
+/* Reads the scenarios, and looks whether what they and the other lines say can be done. */
+static bool check_first(program *p)
+{
+    const rig *const r = &p->o->rig;
+    char line[LANGUAGE_LINE], why[PATH_ROOM + WHY_ROOM];
+    language l = {.e = &p->e, .trace = p->o->trace == NULL ? NULL : &p->trace};
+    for (unsigned i = 0; i < r->count; i++) {
+        for (unsigned n = 0; n < r->members[i].do_count; n++) {
+            do_line(p, i, n, line);
+            if (!check_line(&l, line))
+                return false;
+        }
+        if (!open_script(p, r->members[i].scenario, r->members[i].name))
+            return false;
+    }
+    if (!open_script(p, p->o->scenario, NULL))
+        return false;
+    for (unsigned i = 0; i < p->script_count; i++)
+        if (!script_check(&p->scripts[i], &l, why, sizeof why)) {
+            (void)fprintf(stderr, "dryrig-emu: %s\n", why);
+            return false;
+        }
+    for (unsigned i = 0; i < p->o->do_count; i++)
+        if (!check_line(&l, p->o->dos[i]))
+            return false;
+    return true;
+}
+
+/* What stands in the rig file, then the scenarios, then --do. */
 static bool do_first(program *p)
 {
     const rig *const r = &p->o->rig;
-    char line[LANGUAGE_LINE];
+    char line[LANGUAGE_LINE], why[PATH_ROOM + WHY_ROOM];
     for (unsigned i = 0; i < r->count; i++)
         for (unsigned n = 0; n < r->members[i].do_count; n++) {
-            (void)snprintf(line, sizeof line, "@%s %s", r->members[i].name, r->members[i].do_[n]);
+            do_line(p, i, n, line);
             if (!desk_do(&p->desk, line))
                 return false;
+        }
+    for (unsigned i = 0; i < p->script_count; i++)
+        if (!script_do(&p->scripts[i], &p->desk.language, why, sizeof why)) {
+            (void)fprintf(stderr, "dryrig-emu: %s\n", why);
+            return false;
         }
     for (unsigned i = 0; i < p->o->do_count; i++)
         if (!desk_do(&p->desk, p->o->dos[i]))
             return false;
     return true;
 }
+
+static void close_scripts(program *p)
+{
+    while (p->script_count > 0)
+        script_close(&p->scripts[--p->script_count]);
+    free(p->scripts);
+}
+
+/* -- The command ---------------------------------------------------------------------------------------------------------- */
 
 /* The panel is beside this program, or wherever programs are. */
 static bool start_panel(program *p)
@@ -437,6 +512,13 @@ static int run(program *p)
     char why[PATH_ROOM + 256];
     if (!set_up(p))
         return fail("no memory");
+    if (!check_first(p))
+        return 2;
+    if (p->o->task == TASK_CHECK) {
+        const unsigned count = p->o->rig.count;
+        (void)printf("%s: %u controller%s, nothing wrong\n", p->o->rig_file, count, count == 1 ? "" : "s");
+        return 0;
+    }
     if (!engine_open(&p->e) || !open_signals(p))
         return fail("cannot wait for events (/proc/sys/fs/inotify and ulimit -n have limits)");
     if (has_command(p) && !prepare_run(p))
@@ -455,6 +537,7 @@ static int run(program *p)
         (void)fprintf(stderr, "dryrig-emu: %s\n", why);
         p->status = 1;
     }
+    close_scripts(p);
     if (p->directory[0] != '\0')
         (void)rmdir(p->directory);
     return p->status;
@@ -477,9 +560,5 @@ int main(int argc, char **argv)
         return replay(o.replay);
     if (o.task == TASK_PLAYBACK)
         return playback(&(playback_options){o.replay, o.playback_link, o.speedup, o.clock != CLOCK_REAL});
-    if (o.task == TASK_CHECK) {
-        (void)printf("%s: %u controller%s, nothing wrong\n", o.rig_file, o.rig.count, o.rig.count == 1 ? "" : "s");
-        return 0;
-    }
     return run(&p);
 }

@@ -52,6 +52,7 @@ enum {
     WAIT_CLIENT,
     CONTROL,
     DO,
+    SCENARIO,
     SEED,
     RIG_FILE,
     PANEL,
@@ -104,6 +105,10 @@ static const struct argp_option known[] = {
      "Make a socket PATH that takes commands: 'dryrig-emu ctl PATH help', see dryrig-control(7)", 5},
     {"panel", PANEL, NULL, 0, "Show the controller's panel in this terminal; it ends with it. See dryrig-panel(1)", 5},
     {"do", DO, "COMMAND", 0, "Do this at the start, in the same language; may be repeated", 5},
+    {"scenario", SCENARIO, "FILE", 0,
+     "Do the lines of FILE at the start, before --do; they are checked before anything "
+     "starts",
+     5},
     {"seed", SEED, "N", 0, "Where chance begins (default: another one each time)", 5},
     {"lint", LINT, "on|off", OPTION_ARG_OPTIONAL,
      "At the end, say on stderr which rules of the protocol the host has broken (default with run: on)", 6},
@@ -182,6 +187,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         break;
     case DO:
         repeated(state, t->o->dos, &t->o->do_count, OPTIONS_DO_MAX, "do", value);
+        break;
+    case SCENARIO:
+        once(state, &t->o->scenario, "scenario", value);
         break;
     case SEED:
         once(state, &t->seed, "seed", value);

@@ -30,6 +30,7 @@ typedef struct {
     const char *replay;                 /* TASK_REPLAY, TASK_PLAYBACK: the recording */
     const char *playback_link;          /* TASK_PLAYBACK: the port's stable name; NULL: none */
     const char *control;                /* NULL: none */
+    const char *scenario;               /* a file of what is done; NULL: none */
     const char *dos[OPTIONS_DO_MAX];
     unsigned do_count;
     uint64_t seed;

@@ -1,10 +1,10 @@
-#define _GNU_SOURCE /* getdelim */
 #include "rig.h"
+
+#include "textfile.h" /* columns, which libconfig does not know */
 
 #include <libconfig.h>
 
 #include <ctype.h>
-#include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,27 +18,12 @@ typedef struct {
     bool is_paced_by_default;
 } reading;
 
-/* -- Where something stands --------------------------------------------------------------------------------------------- */
-
-/* libconfig knows lines. The column is that of `word` in the line, else of what stands first in it. */
-static unsigned column_of(const reading *r, unsigned line, const char *word)
-{
-    const char *at = r->text;
-    for (unsigned i = 1; i < line && at != NULL; i++)
-        at = strchr(at, '\n') == NULL ? NULL : strchr(at, '\n') + 1;
-    if (at == NULL)
-        return 1;
-    const size_t length = strcspn(at, "\n");
-    const char *const found = word == NULL || *word == '\0' ? NULL : strstr(at, word);
-    if (found != NULL && found < at + length)
-        return (unsigned)(found - at) + 1u;
-    return (unsigned)strspn(at, " \t") + 1u;
-}
+/* -- What is wrong, and where --------------------------------------------------------------------------------------------- */
 
 __attribute__((format(printf, 4, 5))) static bool wrong(const reading *r, unsigned line, const char *word,
                                                         const char *format, ...)
 {
-    const int length = snprintf(r->why, r->room, "%s:%u:%u: ", r->path, line, column_of(r, line, word));
+    const int length = snprintf(r->why, r->room, "%s:%u:%u: ", r->path, line, textfile_column(r->text, line, word));
     va_list arguments;
     va_start(arguments, format);
     if (length >= 0 && (size_t)length < r->room)
@@ -87,8 +72,15 @@ static bool read_entry(const reading *r, const config_setting_t *entry, rig_memb
     const struct {
         const char *key;
         const char **text;
-    } one[] = {{"name", name},     {"controller", &t->controller}, {"link", &member->link}, {"firmware", &t->firmware},
-               {"home", &t->home}, {"angle", &t->angle},           {"quirks", &t->quirks},  {"pace", &t->pace}};
+    } one[] = {{"name", name},
+               {"controller", &t->controller},
+               {"link", &member->link},
+               {"firmware", &t->firmware},
+               {"scenario", &member->scenario},
+               {"home", &t->home},
+               {"angle", &t->angle},
+               {"quirks", &t->quirks},
+               {"pace", &t->pace}};
     const struct {
         const char *key;
         const char **texts;
@@ -107,7 +99,7 @@ static bool read_entry(const reading *r, const config_setting_t *entry, rig_memb
             return read_list(r, entry, many[i].texts, many[i].most, many[i].count);
     return wrong_at(r, entry,
                     "there is no such entry; expected name, controller, link, firmware, devices, positions, works, "
-                    "home, angle, quirks, pace or do");
+                    "home, angle, quirks, pace, scenario or do");
 }
 
 static bool is_name(const char *name)
@@ -167,22 +159,6 @@ static bool read_member(const reading *r, rig *so_far, const config_setting_t *f
 
 /* -- The file ------------------------------------------------------------------------------------------------------------ */
 
-static char *read_file(const char *path)
-{
-    FILE *const file = fopen(path, "re");
-    char *text = NULL;
-    size_t size = 0;
-    if (file == NULL)
-        return NULL;
-    const ssize_t length = getdelim(&text, &size, '\0', file);
-    (void)fclose(file);
-    if (length < 0) { /* an empty file, or no file */
-        free(text);
-        return calloc(1, 1);
-    }
-    return text;
-}
-
 static bool read_controllers(const reading *r, const config_t *config, rig *result)
 {
     const config_setting_t *const root = config_root_setting(config);
@@ -211,10 +187,10 @@ static bool read_controllers(const reading *r, const config_t *config, rig *resu
 bool rig_read(rig *result, const char *path, bool is_paced_by_default, char *why, size_t room)
 {
     static config_t config; /* holds the texts */
-    char *const text = read_file(path);
+    char *const text = textfile_read(path);
     const reading r = {path, text, why, room, is_paced_by_default};
     if (text == NULL) {
-        (void)snprintf(why, room, "%s: %s", path, strerror(errno));
+        (void)snprintf(why, room, "%s: %s", path, textfile_why());
         return false;
     }
     config_init(&config);

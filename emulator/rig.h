@@ -21,6 +21,7 @@
 typedef struct {
     char name[RIG_NAME_MAX];
     const char *link;            /* NULL: none */
+    const char *scenario;        /* a file of what is done; NULL: none */
     const char *do_[RIG_DO_MAX]; /* what is done at the start, in the control channel's language */
     unsigned do_count;
     setup setup;

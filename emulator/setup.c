@@ -177,6 +177,12 @@ bool setup_has_quirk(const instrument *ins, dr_quirk_id id)
     return (ins->controller.quirks & dr_words_quirk(id)->core) != 0 || (ins->quirks & byte_quirk(id)) != 0;
 }
 
+bool setup_knows_quirk(const instrument *ins, const char *name, char why[WHY_ROOM])
+{
+    dr_quirk_id id;
+    return find_quirk((dr_kind)ins->controller.kind, name, "", &id, why);
+}
+
 bool setup_quirk(instrument *ins, const char *name, bool on, char why[WHY_ROOM])
 {
     dr_quirk_id id;

@@ -45,6 +45,7 @@ void setup_apply(const setup *s, instrument *ins, dr_drive *drives);
 
 /* A quirk by its name, on or off. False: why[] tells what was expected. */
 bool setup_has_quirk(const instrument *ins, dr_quirk_id id);
+bool setup_knows_quirk(const instrument *ins, const char *name, char why[WHY_ROOM]);
 bool setup_quirk(instrument *ins, const char *name, bool on, char why[WHY_ROOM]);
 
 #endif

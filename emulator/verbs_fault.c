@@ -182,6 +182,8 @@ static cJSON *rule_json(const fault_rule *r)
 
 static bool do_faults(telling *t)
 {
+    if (!telling_ends(t))
+        return false;
     cJSON *const active = cJSON_AddArrayToObject(t->answer, "active");
     for (uint8_t i = 0; t->s != NULL && i < faults_of(t)->count; i++)
         (void)cJSON_AddItemToArray(active, rule_json(&faults_of(t)->rules[i]));
@@ -198,7 +200,7 @@ static bool do_faults(telling *t)
         (void)cJSON_AddBoolToObject(entry, "takes_axis", words->takes_axis);
         (void)cJSON_AddItemToArray(list, entry);
     }
-    return telling_ends(t);
+    return true;
 }
 
 const verb verbs_fault[] = {

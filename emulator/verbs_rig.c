@@ -18,6 +18,8 @@ static bool poke(telling *t, const dr_hand *hand, const char *why_not)
     return dr_controller_poke(controller(t), now(t), hand) || telling_wrong(t, "%s", why_not);
 }
 
+static bool has_port(const telling *t) { return t->words[t->at] != NULL && strlen(t->words[t->at]) == 1; }
+
 /* The number of a port that stands next in the line, else that of the active device; as an index. */
 static bool read_port(telling *t, bool is_optional, uint8_t *drive)
 {
@@ -25,7 +27,7 @@ static bool read_port(telling *t, bool is_optional, uint8_t *drive)
     char why[WHY_ROOM];
     unsigned number;
     *drive = controller(t)->active;
-    if (is_optional && (word == NULL || strlen(word) != 1))
+    if (is_optional && !has_port(t))
         return true;
     t->at += word != NULL;
     if (!values_number(word == NULL ? "" : word, 1, controller(t)->drive_count, &number, why))
@@ -158,13 +160,15 @@ static void add_time(const telling *t)
 static bool do_state(telling *t)
 {
     static const char *const modes[] = {"real", "step", "jump"};
+    if (!telling_ends(t))
+        return false;
     (void)cJSON_AddStringToObject(t->answer, "clock", modes[t->l->e->mode]);
     add_time(t);
     cJSON *const list = cJSON_AddArrayToObject(t->answer, "controllers");
     for (unsigned i = 0; i < t->l->e->station_count; i++)
         if (t->s == NULL || t->s == &t->l->e->stations[i])
             (void)cJSON_AddItemToArray(list, controller_json(&t->l->e->stations[i]));
-    return telling_ends(t);
+    return true;
 }
 
 /* -- advance ------------------------------------------------------------------------------------------------------------- */
@@ -178,14 +182,14 @@ static bool do_advance(telling *t)
         return telling_wrong(t, "expected: advance until idle");
     if ((!until_idle || t->words[t->at] != NULL) && !telling_time(t, &span_us))
         return false;
-    if (!telling_ends(t))
-        return false;
     if (e->mode == CLOCK_REAL)
         return telling_wrong(t, "the clock goes by itself; it can be moved with --clock step, or jump");
+    if (t->is_later || t->l->depth > 0)
+        return telling_wrong(t, "a command that comes with time cannot move it");
+    if (!telling_ends(t))
+        return false;
     if (e->waits_for_client)
         return telling_wrong(t, "the clock stands until somebody has opened a port (--wait-client)");
-    if (t->l->depth > 0)
-        return telling_wrong(t, "a command that comes with time cannot move it");
     engine_advance(e, e->now_us + span_us, until_idle);
     add_time(t);
     return true;
@@ -238,9 +242,11 @@ static bool do_device(telling *t)
     uint8_t *const last = &t->s->unplugged[hand.drive];
     const uint8_t present = controller(t)->drives[hand.drive].stage;
     if (telling_take(t, "unplug")) {
+        if (!telling_ends(t))
+            return false;
         if (present == DR_STAGE_NONE)
             return telling_wrong(t, "nothing is plugged in there");
-        if (!telling_ends(t) || !poke(t, &hand, "it cannot be unplugged"))
+        if (!poke(t, &hand, "it cannot be unplugged"))
             return false;
         *last = present;
         return true;
@@ -252,15 +258,15 @@ static bool do_device(telling *t)
         (void)dr_words_stages(text, sizeof text, (dr_kind)controller(t)->kind);
         return telling_wrong(t, "'%s': expected %.500s", model, text);
     }
-    if (model == NULL)
-        id = (dr_stage_id)*last;
-    if (id == DR_STAGE_NONE)
+    if (model != NULL && dr_words_fit(text, sizeof text, id, (dr_kind)controller(t)->kind, controller(t)->firmware,
+                                      (uint8_t)(hand.drive + 1u)) > 0)
+        return telling_wrong(t, "'%s': %.500s", model, text);
+    if (!telling_ends(t))
+        return false;
+    hand.stage = model == NULL ? *last : (uint8_t)id;
+    if (hand.stage == DR_STAGE_NONE)
         return telling_wrong(t, "which model? Nothing was unplugged there before");
-    if (dr_words_fit(text, sizeof text, id, (dr_kind)controller(t)->kind, controller(t)->firmware,
-                     (uint8_t)(hand.drive + 1u)) > 0)
-        return telling_wrong(t, "%s", text);
-    hand.stage = (uint8_t)id;
-    return telling_ends(t) && poke(t, &hand, "it cannot be plugged in");
+    return poke(t, &hand, "it cannot be plugged in");
 }
 
 static bool do_usb(telling *t)
@@ -280,21 +286,29 @@ static bool do_usb(telling *t)
 
 /* -- set, quirk ----------------------------------------------------------------------------------------------------------- */
 
-static bool read_point(telling *t, uint8_t drive, uint32_t steps[DR_AXES])
+/* X,Y,Z for a drive; in a check, for one that may be in use or plugged in by then. */
+static bool read_point(telling *t, uint8_t drive, bool is_active, uint32_t steps[DR_AXES])
 {
-    char why[WHY_ROOM];
+    char why[WHY_ROOM] = "";
     const char *const word = telling_next(t);
-    const dr_stage_id id = (dr_stage_id)controller(t)->drives[drive].stage;
-    if (id == DR_STAGE_NONE)
-        return telling_wrong(t, "there is no device at port %u", drive + 1u);
-    return values_point(word == NULL ? "" : word, id, steps, why) ||
-           telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
+    const uint8_t count = controller(t)->drive_count;
+    bool is_any_connected = false;
+    for (uint8_t i = t->is_check && is_active ? 0 : drive; i < (t->is_check && is_active ? count : drive + 1u); i++) {
+        const dr_stage_id id = (dr_stage_id)controller(t)->drives[i].stage;
+        if (id != DR_STAGE_NONE && values_point(word == NULL ? "" : word, id, steps, why))
+            return true;
+        is_any_connected = is_any_connected || id != DR_STAGE_NONE;
+    }
+    if (is_any_connected)
+        return telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
+    return (t->is_check && word != NULL) || telling_wrong(t, "there is no device at port %u", drive + 1u);
 }
 
 static bool set_position(telling *t)
 {
     dr_hand hand = {.what = DR_HAND_PLACE};
-    return read_port(t, true, &hand.drive) && read_point(t, hand.drive, hand.steps) && telling_ends(t) &&
+    const bool is_active = !has_port(t);
+    return read_port(t, true, &hand.drive) && read_point(t, hand.drive, is_active, hand.steps) && telling_ends(t) &&
            poke(t, &hand, "it moves or is off: nobody can turn it now");
 }
 
@@ -302,10 +316,11 @@ static bool set_work(telling *t)
 {
     uint8_t drive;
     uint32_t steps[DR_AXES];
+    const bool is_active = !has_port(t);
     if (!read_port(t, true, &drive))
         return false;
     const bool is_none = telling_take(t, "none");
-    if ((!is_none && !read_point(t, drive, steps)) || !telling_ends(t))
+    if ((!is_none && !read_point(t, drive, is_active, steps)) || !telling_ends(t))
         return false;
     dr_drive *const d = &controller(t)->drives[drive];
     d->work_is_set = !is_none;
@@ -319,7 +334,7 @@ static bool set_home(telling *t)
     uint32_t steps[DR_AXES];
     if (controller(t)->kind != DR_TRIO)
         return telling_wrong(t, "an MPC-200 stores no home position, its home is 0,0,0");
-    if (!read_point(t, 0, steps) || !telling_ends(t))
+    if (!read_point(t, 0, false, steps) || !telling_ends(t))
         return false;
     memcpy(controller(t)->home_steps, steps, sizeof steps);
     return true;
@@ -352,9 +367,9 @@ static bool set_mode(telling *t)
 {
     char why[WHY_ROOM];
     unsigned mode;
-    const char *const word = t->words[t->at] == NULL ? "" : telling_next(t);
     if (controller(t)->kind != DR_MPC)
         return telling_wrong(t, "a TRIO has no modes");
+    const char *const word = t->words[t->at] == NULL ? "" : telling_next(t);
     if (!values_number(word, 0, 9, &mode, why))
         return telling_wrong(t, "'%s': %s", word, why);
     return telling_ends(t) && (dr_controller_apply(controller(t), now(t), DR_EFFECT_MODE, (uint8_t)mode) ||
@@ -378,9 +393,11 @@ static bool do_quirk(telling *t)
 {
     char why[WHY_ROOM];
     const char *const name = t->words[t->at] == NULL ? "" : telling_next(t);
+    if (!setup_knows_quirk(&t->s->ins, name, why))
+        return telling_wrong(t, "'%s': %s", name, why);
     const bool on = telling_take(t, "on");
     if (!on && !telling_take(t, "off"))
-        return telling_wrong(t, "expected a quirk, and on or off");
+        return telling_wrong(t, "expected on or off behind the quirk");
     if (!telling_ends(t))
         return false;
     return setup_quirk(&t->s->ins, name, on, why) || telling_wrong(t, "'%s': %s", name, why);
@@ -395,20 +412,24 @@ static bool do_trace(telling *t)
         return telling_wrong(t, "expected on or off");
     if (t->l->trace == NULL)
         return telling_wrong(t, "there is no trace; --trace FILE opens one");
+    if (!telling_ends(t))
+        return false;
     t->l->trace->is_on = on;
-    return telling_ends(t);
+    return true;
 }
 
 static bool do_subscribe(telling *t)
 {
-    t->follows = true;
-    return telling_ends(t);
+    t->follows = telling_ends(t);
+    return t->follows;
 }
 
 static bool do_quit(telling *t)
 {
+    if (!telling_ends(t))
+        return false;
     t->l->e->is_over = true;
-    return telling_ends(t);
+    return true;
 }
 
 const verb verbs_rig[] = {
