@@ -419,12 +419,21 @@ static void begin_home(dr_controller *c, dr_us when, uint8_t op)
     begin_move(c, when, op, DR_SPEED_FULL, target, true);
 }
 
+/* Is there no work position to go to, or is this not where one goes there from? */
+static bool lacks_work(dr_controller *c, dr_us when, uint8_t op)
+{
+    const dr_drive *drive = active_drive(c);
+    if (drive->work_is_set && (op != DR_OP_MPC_WORK || drive->at_home))
+        return false;
+    note_value(c, when, drive->work_is_set ? DR_NOTE_NOT_AT_HOME : DR_NOTE_NO_WORK, op, 0);
+    return true;
+}
+
 static void begin_work(dr_controller *c, dr_us when, uint8_t op)
 {
     const dr_drive *drive = active_drive(c);
     uint32_t target[DR_AXES];
-    if (!drive->work_is_set || (op == DR_OP_MPC_WORK && !drive->at_home)) {
-        note_value(c, when, drive->work_is_set ? DR_NOTE_NOT_AT_HOME : DR_NOTE_NO_WORK, op, 0);
+    if (lacks_work(c, when, op)) {
         answer_cr(c, when, op);
         return;
     }
@@ -926,8 +935,6 @@ static bool is_possible(const dr_controller *c, dr_effect effect, uint8_t value)
     if (c->state != DR_STATE_REST)
         return false;
     switch (effect) {
-    case DR_EFFECT_WORK:
-        return active_drive(c)->work_is_set && (trio || active_drive(c)->at_home);
     case DR_EFFECT_CALIBRATE:
         return !trio;
     case DR_EFFECT_SELECT:
@@ -980,6 +987,8 @@ bool dr_controller_apply(dr_controller *c, dr_us now, dr_effect effect, uint8_t 
         begin_by_hand(c, now, trio ? DR_OP_TRIO_HOME : DR_OP_MPC_HOME);
         break;
     case DR_EFFECT_WORK:
+        if (lacks_work(c, now, trio ? DR_OP_TRIO_WORK : DR_OP_MPC_WORK))
+            return false;
         begin_by_hand(c, now, trio ? DR_OP_TRIO_WORK : DR_OP_MPC_WORK);
         break;
     case DR_EFFECT_CALIBRATE:

@@ -185,6 +185,13 @@ void bench_place(uint32_t x, uint32_t y, uint32_t z)
 
 bool bench_moves(void) { return bench_look().moving != DR_OP_NONE; }
 
+void bench_expect_note(dr_note_kind what)
+{
+    dr_note note = {.what = UINT8_MAX};
+    while (dr_notes_take(&b.notes, &note)) {}
+    TEST_ASSERT_EQUAL(what, note.what);
+}
+
 void bench_run(void (*test)(void), const char *name, int line)
 {
     static const dr_us clocks[] = {0, UINT32_MAX - 5u * MS, UINT32_MAX - 2u * S, UINT32_MAX - 4u * S, 0x7FFFFFFFu};

@@ -68,6 +68,9 @@ void bench_expect_answer_at(uint32_t x, uint32_t y, uint32_t z);
 void bench_place(uint32_t x, uint32_t y, uint32_t z);
 bool bench_moves(void);
 
+/* The newest note is this one; all are forgotten. */
+void bench_expect_note(dr_note_kind what);
+
 /* Runs one test with each clock. */
 void bench_run(void (*test)(void), const char *name, int line);
 #define RUN(test) bench_run(test, #test, __LINE__)

@@ -53,6 +53,7 @@ static void work_goes_as_the_hosts_y_does(void)
     bench_place(16000, 16000, 16000);
     bench_tap(DR_BUTTON_WORK); /* none is stored */
     TEST_ASSERT_FALSE(bench_moves());
+    bench_expect_note(DR_NOTE_NO_WORK);
     bench_press(DR_BUTTON_STOP);
     bench_press(DR_BUTTON_WORK);
     bench_release(DR_BUTTON_WORK);
@@ -60,6 +61,7 @@ static void work_goes_as_the_hosts_y_does(void)
     bench_turn(DR_KNOB_X, 5);
     bench_tap(DR_BUTTON_WORK); /* not at home */
     TEST_ASSERT_FALSE(bench_moves());
+    bench_expect_note(DR_NOTE_NOT_AT_HOME);
     bench_tap(DR_BUTTON_HOME);
     bench_wait_until_idle();
     bench_press(DR_BUTTON_WORK);
