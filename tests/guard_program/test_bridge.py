@@ -27,6 +27,17 @@ class Passing(unittest.TestCase):
             (b"C", 14), (b"K", 4), (b"U", 6), (b"I\x01", 2), (b"F", 1), (b"L\x03", 1),
             (move_mpc(100, 200, 50), 1), (b"C", 14), (move_mpc(0, 0, 0), 1), (b"C", 14), (b"\x03", 1)])
 
+    def test_an_mpc_of_old_firmware_answers_through_the_guard_as_without_it(self):
+        config = rig(guard.MPC).replace('"3.21"', '"1.03"')
+        self.both("mpc", config, [(b"C", 14), (b"K", 2), (b"A", 2), (move_mpc(100, 200, 50), 1), (b"C", 14)], "--firmware", "1.03")
+
+    def test_an_mpc_without_manipulators_stays_locked(self):
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST, "--device", "none") as e:
+            with Guard(directory, e.path, rig(guard.MPC), wait="locked") as g, emu.Port(g.path) as port:
+                port.send(b"C")
+                self.assertEqual(port.receive(1, 0.3), b"")
+                self.assertEqual(g.order("arm")["ok"], False)
+
     def test_a_trio_answers_through_the_guard_as_without_it(self):
         point = emu.point
         self.both("trio", rig(guard.TRIO), [
