@@ -24,12 +24,14 @@ def run(*args, env=None, program=DRYRIG):
 
 
 class Rig:
-    """An emulator, and dryrig's options for it."""
+    """An emulator, and dryrig's options for it. Its lint has nothing to say, but for what is done wrong on purpose: `breaks`."""
 
     def __init__(self, kind, stage, *args):
         self.folder = tempfile.TemporaryDirectory()
         self.trace = f"{self.folder.name}/trace"
-        self.process = subprocess.Popen([EMULATOR, kind, "--device", stage, "--trace", self.trace, *args],
+        self.lint = f"{self.folder.name}/lint"
+        self.breaks = set()  # rules, by name
+        self.process = subprocess.Popen([EMULATOR, kind, "--device", stage, "--trace", self.trace, "--lint-json", self.lint, *args],
                                         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         self.path = self.process.stdout.readline().removeprefix("ready ").strip()
         self.options = ["--port", self.path, "--controller", kind, "--stage", stage]
@@ -37,13 +39,18 @@ class Rig:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
-        self.stop()
+    def __exit__(self, kind, *_):
+        findings = self.stop()
+        if kind is None and {finding["name"] for finding in findings} != self.breaks:
+            raise AssertionError(f"{findings}, not {self.breaks}")
 
     def stop(self):
         self.process.terminate()
         self.process.communicate(timeout=LIMIT_S)
+        with open(self.lint, encoding="utf-8") as file:
+            findings = json.load(file)["findings"]
         self.folder.cleanup()
+        return findings
 
     def wait_for_request(self, code):
         """Until the emulator has got a command that begins with this byte."""
@@ -86,6 +93,7 @@ class Commands(unittest.TestCase):
             rig.run("home")
             self.assertEqual("x 0.000  y 0.000  z 1000.000 um  drive 1\n", rig.run("work"))
             self.assertIn("stood still", rig.run("work", expect=1))
+            rig.breaks = {"work-without-home"}
             rig.run("calibrate")
             rig.run("mode", "3")
             rig.run("select", "2")
@@ -152,6 +160,7 @@ class Commands(unittest.TestCase):
         quirks = "observed,position-13,stop-says-i,nul-heartbeat"
         with Rig("mpc", "MP-225", "--quirks", quirks, "--position", "320,0,0") as rig:
             rig.run("--steps", "move", "2000", "2000", "2000")
+            rig.breaks = {"small-move"}
             self.assertIn("under 16 steps", rig.run("--steps", "move", "2015", "2000", "2000", expect=1))
             rig.run("--steps", "line", "1000", "0", "7", "--speed", "15")
             rig.run("home")
@@ -241,6 +250,7 @@ class Ports(Starting):
 
     def test_a_busy_port_names_who_has_it(self):
         with Rig("mpc", "MP-225") as rig:
+            rig.breaks = {"unread-reply"}  # one is killed while it moves
             self.check_busy(rig.options, {})
 
     def test_a_link_and_a_port_that_ends(self):
@@ -269,6 +279,7 @@ class Ports(Starting):
                     status, out, err = run(*options, *words, env=env)
                     self.assertEqual((0, ""), (status, err), words)
         with Rig("mpc", "MP-225") as rig:
+            rig.breaks = {"unread-reply"}  # one is killed while it moves
             self.check_busy(["-p", "/dev/ttyEMU0", "-c", "mpc", "-s", "MP-225"], {**env, "DRYRIG_SHIM_PTY": rig.path})
 
 
