@@ -1,6 +1,7 @@
 #include "controls.h"
 
 #include <curses.h> /* keys */
+#include <string.h>
 
 const control_button *controls_buttons(dr_kind kind)
 {
@@ -84,4 +85,50 @@ const char *const *controls_help(dr_kind kind)
                                       "the answer waits for the end of the move.",
                                       NULL};
     return kind == DR_TRIO ? trio : mpc;
+}
+
+static bool is_any(const char *name, const char *first, const char *second)
+{
+    return strcmp(name, first) == 0 || strcmp(name, second) == 0;
+}
+
+static const char *hint_moving(const model *m, const char *name, control_use use)
+{
+    if (m->kind == DR_MPC)
+        return strcmp(name, "stop") == 0 ? NULL : "it moves: only STOP works until it is there";
+    if (use == CONTROL_TURNED)
+        return "it moves: the knobs are dead until it is there";
+    return use == CONTROL_PRESSED && is_any(name, "home", "work")
+               ? NULL
+               : "it moves: only the button of this move works, and pauses it";
+}
+
+static const char *hint_locked(const model *m, const char *name, control_use use)
+{
+    if (m->kind == DR_TRIO)
+        return use == CONTROL_TURNED ? "the knobs are locked: S unlocks them" : NULL;
+    const bool unlocks = strcmp(name, "work") == 0 && use == CONTROL_HELD;
+    const bool stops = strcmp(name, "stop") == 0 && use == CONTROL_PRESSED;
+    return unlocks || stops || strcmp(name, "manipulator") == 0 ? NULL : "this drive is locked: W unlocks it";
+}
+
+const char *controls_hint(const model *m, const char *name, control_use use)
+{
+    unsigned connected = 0;
+    for (unsigned i = 0; i < m->device_count; i++)
+        connected += m->devices[i].is_there;
+    if (strcmp(m->state, "off") == 0)
+        return "it has no power: o switches it on";
+    if (strcmp(m->state, "wedged") == 0)
+        return "it hangs: switch it off and on again, with o";
+    if (connected == 0)
+        return "nothing is connected: all controls are dead";
+    const char *hint = m->moves ? hint_moving(m, name, use) : m->is_locked ? hint_locked(m, name, use) : NULL;
+    if (hint == NULL && !m->moves && strcmp(name, "manipulator") == 0 && connected == 1)
+        hint = "no other device is connected";
+    if (hint == NULL && !m->moves && strcmp(name, "work") == 0 && use == CONTROL_PRESSED &&
+        !model_active(m)->work_is_set)
+        hint = m->kind == DR_TRIO ? "no work position is stored yet: W stores this place"
+                                  : "no work position is stored yet: S stores this place";
+    return hint;
 }

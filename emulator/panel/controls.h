@@ -4,6 +4,8 @@
 #ifndef CONTROLS_H
 #define CONTROLS_H
 
+#include "model.h" /* what is known of the controller */
+
 #include "dr_device.h" /* dr_kind */
 
 /* A button. Its capital letter holds it. */
@@ -28,5 +30,11 @@ const control_button *controls_buttons(dr_kind kind);
 const control_knob *controls_knobs(dr_kind kind);
 /* How a panel is used: lines of up to 78 characters, NULL behind the last. */
 const char *const *controls_help(dr_kind kind);
+
+typedef enum { CONTROL_PRESSED, CONTROL_HELD, CONTROL_TURNED } control_use;
+
+/* Why a control will do nothing as things are, and what helps; NULL: it will do something. Only a hint: what happens is
+ * decided by the emulator, whose state may be newer. */
+const char *controls_hint(const model *m, const char *name, control_use use);
 
 #endif

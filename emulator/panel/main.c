@@ -182,19 +182,30 @@ static void type(panel *p, int key)
     }
 }
 
+static void hint(panel *p, const char *control, control_use use)
+{
+    const char *const why = controls_hint(&p->m, control, use);
+    if (why != NULL)
+        (void)snprintf(p->message, sizeof p->message, "%s", why);
+}
+
+/* The order goes out in any case: the emulator knows better. */
 static bool work_control(panel *p, int key)
 {
     for (const control_button *b = controls_buttons(p->m.kind); b->key != 0; b++) {
-        if (key == b->key)
-            say(p, "press %s", b->name);
-        else if (key == b->key - 'a' + 'A' && b->held_order != NULL)
+        const bool is_held = key == b->key - 'a' + 'A' && b->held_order != NULL;
+        if (!is_held && key != b->key)
+            continue;
+        hint(p, b->name, is_held ? CONTROL_HELD : CONTROL_PRESSED);
+        if (is_held)
             order_lines(p, b->held_order);
         else
-            continue;
+            say(p, "press %s", b->name);
         return true;
     }
     for (const control_knob *k = controls_knobs(p->m.kind); k->key != 0; k++)
         if (key == k->key) {
+            hint(p, k->name, CONTROL_TURNED);
             say(p, "knob %s %+d", k->name, k->way * (k->is_selector ? 1 : (int)p->detents));
             return true;
         }

@@ -282,15 +282,18 @@ static void draw_answer(const model *m, int row)
     const model_device *const d = model_active(m);
     const char letter = m->kind == DR_TRIO ? 'c' : 'C';
     char bytes[64], number[DR_AXES][24];
-    if (m->colour == MODEL_DARK || !d->is_there) {
+    if (m->colour == MODEL_DARK || !d->is_there || strcmp(m->state, "stranded") == 0 ||
+        strcmp(m->state, "wedged") == 0) {
         put(row, 0, COLS, " %c: a host that asks where it is gets no answer now", letter);
         return;
     }
-    model_position_answer(m, bytes);
-    put(row, 0, COLS, " %c answers %s", letter, bytes);
-    (void)printw("%s", m->moves                            ? "  when the move is over"
-                       : m->is_relative || m->led_diagonal ? "  absolute, always"
-                                                           : "");
+    if (m->moves) {
+        put(row, 0, COLS, " %c waits for the end of the move; on the way there now:", letter);
+    } else {
+        model_position_answer(m, bytes);
+        put(row, 0, COLS, " %c answers %s%s", letter, bytes,
+            m->is_relative || m->led_diagonal ? "  absolute, always" : "");
+    }
     for (unsigned axis = 0; axis < DR_AXES; axis++)
         (void)dr_words_number(number[axis], sizeof number[axis], d->at_steps[axis]);
     put(row + 1, 0, COLS, "   = X %s, Y %s, Z %s microsteps of %g um", number[DR_X], number[DR_Y], number[DR_Z],

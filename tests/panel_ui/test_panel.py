@@ -130,7 +130,8 @@ class Screens(unittest.TestCase):
             t.shows("green")
             e.do("press home")
             e.do("advance 2100ms")  # Z: 10,000 of 18,750 um
-            t.shows("red", "Z   8750", "HOME", "when the move is over", "by hand: go home")
+            t.shows("red", "Z   8750", "HOME", "c waits for the end of the move; on the way there now:", "by hand: go home")
+            self.assertNotIn("c answers", t.text())  # what it will answer is not where it is now
             self.assertIn(RED, t.colours())
             rows = [row[55:79] for row in t.rows()[2:12]]
             column = "".join(row[17] for row in rows)
@@ -275,6 +276,63 @@ class Keys(unittest.TestCase):
             e.do("advance 1s")
             t.shows("beep")
             self.assertEqual(e.controller()["devices"][0]["work_steps"], [160, 0, 0])
+
+    def test_a_control_that_does_nothing_says_why(self):
+        with trio() as e, Terminal(PANEL, e.socket_path) as t:
+            t.shows("green")
+            t.keys("w")
+            t.shows("no work position is stored yet: W stores this place")
+            e.do("advance until idle")
+            t.shows("no work position is stored: nothing moves")  # in the log
+            t.keys("S")
+            emu.wait_until(lambda: e.do("panel")["down"] == ["speed"], "S holds SPEED")
+            e.do("advance 3s")
+            t.shows("1366.06  LOCK")
+            t.keys("Right")
+            t.shows("the knobs are locked: S unlocks them")
+            t.keys("h")
+            emu.wait_until(lambda: e.do("panel")["down"] == ["home"], "buttons are not")
+            e.do("advance 200ms")
+            t.shows("waits for the end of the move")
+            t.keys("]")
+            t.shows("it moves: the knobs are dead until it is there")
+            t.keys("p")
+            t.shows("it moves: only the button of this move works, and pauses it")
+            t.keys("h")
+            emu.wait_until(lambda: "home" in e.do("panel")["down"], "HOME does")
+            e.do("advance 200ms")
+            t.shows("PAUSED")
+            e.do("power off")
+            t.shows("dark")
+            t.keys("h")
+            t.shows("it has no power: o switches it on")
+
+    def test_a_control_of_an_mpc_that_does_nothing_says_why(self):
+        with mpc("--device", "MP-225", "--device", "none") as e, Terminal(PANEL, e.socket_path) as t:
+            t.shows("DRIVE 1")
+            t.keys("w")
+            t.shows("no work position is stored yet: S stores this place")
+            e.do("advance until idle")
+            t.keys("W")
+            emu.wait_until(lambda: e.do("panel")["down"] == ["work"], "W holds WORK POS.")
+            e.do("advance 2s")
+            t.shows("LOCK")
+            for key in ("Right", "+", "h", "d"):
+                t.keys(key)
+                t.shows("this drive is locked: W unlocks it")
+                t.keys("m")
+                t.shows("no other device is connected")
+            self.assertEqual(e.position(), [0, 0, 0])
+            e.do("set position 1 100000,0,0")
+            e.do("hold work 2s")
+            e.do("advance 2s")
+            e.do("press home")
+            e.do("advance 200ms")
+            t.shows("waits for the end of the move")
+            t.keys("Up")
+            t.shows("it moves: only STOP works until it is there")
+            t.keys("s")
+            emu.wait_until(lambda: e.do("panel")["moving"] is None, "STOP does")
 
     def test_a_command_is_typed(self):
         with trio() as e, Terminal(PANEL, e.socket_path) as t:
