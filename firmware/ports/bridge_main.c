@@ -207,7 +207,7 @@ static void feed_watchdog(dr_us now)
 
 /* -- The loop ------------------------------------------------------------------------------------------------------ */
 
-/* The way of a stop comes first. */
+/* The way of a stop comes first. It never sleeps: contacts have no interrupt. */
 void dr_bridge_step(void)
 {
     const dr_us now = dr_port_now_us();
@@ -219,8 +219,6 @@ void dr_bridge_step(void)
     tell_log();
     show(now);
     feed_watchdog(now);
-    if (dr_port_waits())
-        dr_port_wait(true, now + DR_LOOK_US / 2u);
 }
 
 /* -- The start ----------------------------------------------------------------------------------------------------- */
@@ -234,7 +232,7 @@ static place read_configuration(uint8_t which)
     bool is_blank = true;
     dr_port_configuration(which, image, sizeof image);
     for (size_t i = 0; i < sizeof image && is_blank; i++)
-        is_blank = image[i] == 0xFFu;
+        is_blank = image[i] == image[0]; /* as memory is when it was never written, or erased */
     if (is_blank)
         return PLACE_BLANK;
     return dr_limits_get(image, sizeof image, &b.limits, &problem) ? PLACE_GOOD : PLACE_DAMAGED;

@@ -1,6 +1,6 @@
 /* bridge_port: what a board provides besides port.h to be a bridge, the guard (dr_guard.h) between a host and a controller.
- * Its main() calls dr_bridge_begin() once and then dr_bridge_step() for ever. Of port.h it needs the clock, the sleep, inputs
- * and outputs, wired as follows; docs/boards.md has the pins.
+ * Its main() calls dr_bridge_begin() once and then dr_bridge_step() for ever. Of port.h it needs the clock, inputs and
+ * outputs, wired as follows; docs/boards.md has the pins.
  *
  *     input    closed means
  *     0, 1     no stop: two contacts of one emergency-stop button, normally closed; an open wire is a stop

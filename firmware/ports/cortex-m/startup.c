@@ -44,6 +44,9 @@ __attribute__((section(".vectors"), used)) static const vector vectors[FIRST_INT
     [MEMORY_FAULT] = {.handler = dr_fault},
     [BUS_FAULT] = {.handler = dr_fault},
     [USAGE_FAULT] = {.handler = dr_fault},
-    [FIRST_INTERRUPT + DR_INTERRUPT_UART] = {.handler = dr_interrupt_uart},
+    [FIRST_INTERRUPT + 0] = {.handler = dr_interrupt_uart},
+    [FIRST_INTERRUPT + 2] = {.handler = dr_interrupt_uart},
+    [FIRST_INTERRUPT + 4] = {.handler = dr_interrupt_uart},
+    [FIRST_INTERRUPT + 18] = {.handler = dr_interrupt_uart},
     [FIRST_INTERRUPT + DR_INTERRUPT_TIMER] = {.handler = dr_interrupt_timer},
 };
