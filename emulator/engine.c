@@ -314,6 +314,12 @@ static int wait_for_events(const engine *e, struct epoll_event *events)
     return epoll_wait(e->epoll, events, EVENTS, 0);
 }
 
+static void tell_owner(const engine *e)
+{
+    if (e->after != NULL)
+        e->after(e->context);
+}
+
 /* What was due comes first, then who is there, then what they have sent. */
 void engine_run(engine *e)
 {
@@ -342,6 +348,7 @@ void engine_run(engine *e)
             if (is_station(e, events[i].data.ptr))
                 flush(e, station_of(e, events[i].data.ptr));
         flush_all(e);
+        tell_owner(e);
     }
 }
 
@@ -375,6 +382,7 @@ void engine_advance(engine *e, uint64_t until_us, bool until_idle)
         e->now_us = until_us;
     run_to_now(e);
     flush_all(e);
+    tell_owner(e);
 }
 
 /* -- Beginning and end --------------------------------------------------------------------------------------------------- */

@@ -39,7 +39,9 @@ typedef struct {
     unsigned station_count;
     clock_mode mode;
     unsigned speedup;
-    bool waits_for_client; /* the clock stands until somebody has opened a port */
+    bool waits_for_client;        /* the clock stands until somebody has opened a port */
+    void (*after)(void *context); /* called when all has been done that was to be done; NULL: nobody */
+    void *context;
 
     /* to be read by anybody */
     int epoll, inotify;

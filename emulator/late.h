@@ -7,7 +7,9 @@
 
 #include <stdint.h>
 
-/* In microseconds since it began. 0 where the kernel does not count it. */
+/* In microseconds since it began, as far as the kernel counts it, and what was added. */
 uint64_t late_us(void);
+/* It has waited for something else so long: for a disk. */
+void late_add(uint64_t span_us);
 
 #endif

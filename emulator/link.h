@@ -15,6 +15,9 @@
 /* Makes the link. Returns the lock, a descriptor to be kept open until link_remove(). -1: why[] says what is in the way and
  * what to do; nothing was changed. */
 int link_make(const char *link_path, const char *pts_path, char *why, size_t room);
+/* The lock alone, on any path: a descriptor that holds it as long as it is open. -1: errno is EADDRINUSE where somebody has
+ * it. */
+int link_lock(const char *path);
 /* Removes it, if it still leads to this port. */
 void link_remove(const char *link_path, const char *pts_path, int lock);
 

@@ -42,6 +42,7 @@ typedef struct {
     trace trace;
     observer_link *trace_links;
     desk desk;
+    kept_file *kept; /* one for each station */
     script *scripts; /* scenarios, in the order in which they are done */
     unsigned script_count;
     lint lint;
@@ -140,6 +141,8 @@ static void introduce_one(const setup *s, unsigned speedup)
         (void)fprintf(stderr, "not paced");
     if (speedup > 1)
         (void)fprintf(stderr, ", %u times faster than real time", speedup);
+    if (s->state != NULL)
+        (void)fprintf(stderr, "\n  state:   %s%s", s->state, s->was_kept ? ", as it was left" : ", new");
 }
 
 static void suggest(const setup *s, const char *port)
@@ -258,8 +261,9 @@ static bool set_up(program *p)
     p->lint_links = calloc(o->rig.count, sizeof *p->lint_links);
     p->record_links = calloc(o->rig.count, sizeof *p->record_links);
     p->scripts = calloc(o->rig.count + 1u, sizeof *p->scripts);
+    p->kept = calloc(o->rig.count, sizeof *p->kept);
     if (e->stations == NULL || p->trace_links == NULL || p->lint_links == NULL || p->record_links == NULL ||
-        p->scripts == NULL)
+        p->scripts == NULL || p->kept == NULL)
         return false;
     for (unsigned i = 0; i < e->station_count; i++) {
         station *const s = &e->stations[i];
@@ -343,6 +347,50 @@ static void report_lint(program *p)
     if (p->o->is_strict && p->status == 0 && lint_total(&p->lint) > 0)
         p->status = EXIT_FINDINGS;
     lint_close(&p->lint);
+}
+
+/* -- What is kept -------------------------------------------------------------------------------------------------------- */
+
+static void update_kept(void *context)
+{
+    program *const p = context;
+    for (unsigned i = 0; i < p->e.station_count; i++)
+        kept_update(&p->kept[i], &p->e.stations[i].ins);
+}
+
+static bool open_kept(program *p)
+{
+    char why[WHY_ROOM];
+    for (unsigned i = 0; i < p->e.station_count; i++) {
+        const setup *const s = &p->o->rig.members[i].setup;
+        if (s->state == NULL)
+            continue;
+        if (!kept_open(&p->kept[i], s->state, s->was_kept ? &s->kept : NULL, why)) {
+            (void)fprintf(stderr, "dryrig-emu: --state: %s\n", why);
+            return false;
+        }
+        p->e.after = update_kept;
+        p->e.context = p;
+    }
+    return true;
+}
+
+static bool begin_kept(program *p)
+{
+    char why[WHY_ROOM];
+    for (unsigned i = 0; i < p->e.station_count; i++)
+        if (!kept_begin(&p->kept[i], &p->e.stations[i].ins, why)) {
+            (void)fprintf(stderr, "dryrig-emu: --state: %s\n", why);
+            return false;
+        }
+    return true;
+}
+
+static void close_kept(program *p)
+{
+    for (unsigned i = 0; i < p->e.station_count; i++)
+        kept_close(&p->kept[i], &p->e.stations[i].ins);
+    free(p->kept);
 }
 
 /* -- What is done at the start ------------------------------------------------------------------------------------------- */
@@ -483,10 +531,14 @@ static void start_and_run(program *p)
     if (!has_command(p))
         introduce(p);
     engine_start(&p->e);
+    for (unsigned i = 0; i < p->e.station_count; i++)
+        setup_started(&p->o->rig.members[i].setup, &p->e.stations[i].ins);
     if (!do_first(p)) {
         p->status = 2;
         return;
     }
+    if (!begin_kept(p))
+        return;
     if (!has_command(p) && !say_ready(p)) {
         (void)fail("cannot write the line 'ready' to stdout");
         return;
@@ -523,12 +575,15 @@ static int run(program *p)
         return fail("cannot wait for events (/proc/sys/fs/inotify and ulimit -n have limits)");
     if (has_command(p) && !prepare_run(p))
         return fail("run: cannot make a directory for the command's ports (TMPDIR says where)");
-    if (engine_plug(&p->e, why, sizeof why)) {
+    if (!open_kept(p)) {
+        p->status = 1;
+    } else if (engine_plug(&p->e, why, sizeof why)) {
         start_and_run(p);
         tell_seed(p);
         desk_close(&p->desk);
         if (p->o->task == TASK_PANEL)
             end_panel(p);
+        close_kept(p);
         engine_close(&p->e);
         trace_close(&p->trace);
         recorder_close(&p->recorder);

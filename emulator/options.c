@@ -53,6 +53,7 @@ enum {
     CONTROL,
     DO,
     SCENARIO,
+    STATE,
     SEED,
     RIG_FILE,
     PANEL,
@@ -98,6 +99,11 @@ static const struct argp_option known[] = {
      4},
     {"speedup", SPEEDUP, "N", 0, "Run the controller's clock and its line N times faster, 1 to 1000", 4},
     {"wait-client", WAIT_CLIENT, NULL, 0, "The controller's clock stands until somebody has opened the port", 4},
+    {"state", STATE, "FILE", 0,
+     "Begin where the controller was left, and keep positions, home, work, angle and switches in FILE; what other "
+     "options say "
+     "counts more",
+     5},
     {"trace", TRACE, "FILE", 0,
      "Write what happens, in words, to FILE; '-' is stderr; FILE.jsonl gets JSON, an object a line", 5},
     {"record", RECORD, "FILE", 0, "Write the bytes of both directions, with times, to FILE", 5},
@@ -190,6 +196,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         break;
     case SCENARIO:
         once(state, &t->o->scenario, "scenario", value);
+        break;
+    case STATE:
+        once(state, &one->state, "state", value);
         break;
     case SEED:
         once(state, &t->seed, "seed", value);
@@ -317,6 +326,8 @@ static void read_one(options *o, const typed *t, bool is_paced_by_default)
     if (!setup_read(&t->one, is_paced_by_default, &s, &problem)) {
         if (strcmp(problem.what, "controller") == 0)
             refuse("'%s': %s", problem.text, problem.why);
+        if (strcmp(problem.what, "state") == 0)
+            refuse("--state: %s", problem.why);
         refuse("--%s %s: %s", problem.what, problem.text == NULL ? "" : problem.text, problem.why);
     }
     if (t->link != NULL && *t->link == '\0')
@@ -330,9 +341,9 @@ static void read_rig(options *o, const typed *t, bool is_paced_by_default)
     char why[1024];
     const setup_text *one = &t->one;
     if (t->link != NULL || one->firmware != NULL || one->home != NULL || one->angle != NULL || one->quirks != NULL ||
-        one->pace != NULL || one->device_count + one->position_count + one->work_count > 0)
+        one->pace != NULL || one->state != NULL || one->device_count + one->position_count + one->work_count > 0)
         refuse("what a controller is like stands in the rig file: --link, --device, --firmware, --position, --home, "
-               "--work, --angle, --quirks and --pace are for one controller without a file");
+               "--work, --angle, --quirks, --pace and --state are for one controller without a file");
     o->rig_file = t->rig;
     if (!rig_read(&o->rig, t->rig, is_paced_by_default, why, sizeof why)) {
         (void)fprintf(stderr, "dryrig-emu: %s\n", why);

@@ -77,6 +77,7 @@ static bool read_entry(const reading *r, const config_setting_t *entry, rig_memb
                {"link", &member->link},
                {"firmware", &t->firmware},
                {"scenario", &member->scenario},
+               {"state", &t->state},
                {"home", &t->home},
                {"angle", &t->angle},
                {"quirks", &t->quirks},
@@ -99,7 +100,7 @@ static bool read_entry(const reading *r, const config_setting_t *entry, rig_memb
             return read_list(r, entry, many[i].texts, many[i].most, many[i].count);
     return wrong_at(r, entry,
                     "there is no such entry; expected name, controller, link, firmware, devices, positions, works, "
-                    "home, angle, quirks, pace, scenario or do");
+                    "home, angle, quirks, pace, scenario, state or do");
 }
 
 static bool is_name(const char *name)

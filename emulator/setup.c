@@ -49,13 +49,50 @@ static bool read_devices(setup *o, const setup_text *t, setup_problem *problem)
     }
     const char *const *names = t->device_count > 0 ? t->devices : usual[o->kind];
     for (uint8_t i = 0; i < o->drive_count; i++) {
+        const kept_drive *const k = &o->kept.drives[i];
+        const bool is_kept = o->was_kept && t->device_count == 0;
+        const char *const name = is_kept ? dr_words_stage((dr_stage_id)k->stage) : names[i];
         dr_stage_id stage;
-        at(problem, "device", i, names[i]);
-        if (!read_device(o, (uint8_t)(i + 1u), names[i], &stage, problem))
+        at(problem, "device", i, name);
+        if (!read_device(o, (uint8_t)(i + 1u), name, &stage, problem))
             return false;
+        if (o->was_kept && k->stage != stage)
+            return wrong(problem, "%s was at port %u when %s was written; with other devices, take another file",
+                         dr_words_stage((dr_stage_id)k->stage), i + 1u, t->state);
         dr_drive_init(&o->drives[i], stage);
     }
     return true;
+}
+
+/* -- What was kept ------------------------------------------------------------------------------------------------------ */
+
+static bool read_state(setup *o, const setup_text *t, setup_problem *problem)
+{
+    at(problem, "state", 0, t->state);
+    o->state = t->state;
+    if (t->state == NULL)
+        return true;
+    if (*t->state == '\0')
+        return wrong(problem, "a path is missing");
+    if (!kept_read(t->state, &o->kept, &o->was_kept, problem->why))
+        return false;
+    return !o->was_kept || o->kept.kind == o->kind ||
+           wrong(problem, "this is the state of a controller '%s'", dr_words_kind(o->kept.kind));
+}
+
+static void set_as_kept(setup *o)
+{
+    for (uint8_t i = 0; i < o->drive_count; i++) {
+        const kept_drive *const k = &o->kept.drives[i];
+        dr_drive *const d = &o->drives[i];
+        memcpy(d->position_steps, k->position_steps, sizeof d->position_steps);
+        memcpy(d->work_steps, k->work_steps, sizeof d->work_steps);
+        d->work_is_set = k->work_is_set;
+        d->calibration = k->calibration;
+        if (o->kind == DR_MPC)
+            d->diagonal = k->rear % DR_DIAGONALS; /* switches 1 to 4 [M table 2] */
+    }
+    memcpy(o->home_steps, o->kept.home_steps, sizeof o->home_steps);
 }
 
 /* The drive that the n-th position or work position is for: the n-th that is connected. */
@@ -95,7 +132,7 @@ static bool read_points(setup *o, const setup_text *t, setup_problem *problem)
 
 static bool read_angle(setup *o, const char *text, setup_problem *problem)
 {
-    unsigned angle_deg = DR_ANGLE_DEFAULT_DEG;
+    unsigned angle_deg = o->was_kept ? o->kept.angle_deg : DR_ANGLE_DEFAULT_DEG;
     uint8_t diagonal;
     at(problem, "angle", 0, text);
     if (text != NULL && o->kind == DR_TRIO && !values_number(text, 0, DR_ANGLE_MAX_DEG, &angle_deg, problem->why))
@@ -105,8 +142,9 @@ static bool read_angle(setup *o, const char *text, setup_problem *problem)
         return true;
     if (!values_diagonal(text, &diagonal, problem->why))
         return false;
-    for (uint8_t i = 0; i < o->drive_count; i++)
+    for (uint8_t i = 0; i < o->drive_count; i++) {
         o->drives[i].diagonal = diagonal;
+    }
     return true;
 }
 
@@ -211,12 +249,25 @@ bool setup_read(const setup_text *t, bool is_paced_by_default, setup *o, setup_p
         return wrong(problem, "%s", bad);
     if (o->firmware > newest) /* what it would do, nobody here knows */
         return wrong(problem, "the manual tells of 1.00 to %x.%02x", newest >> 8u, newest & 0xFFu);
-    if (!read_devices(o, t, problem) || !read_points(o, t, problem) || !read_angle(o, t->angle, problem) ||
+    if (!read_state(o, t, problem) || !read_devices(o, t, problem))
+        return false;
+    if (o->was_kept)
+        set_as_kept(o);
+    if (!read_points(o, t, problem) || !read_angle(o, t->angle, problem) ||
         !read_quirks(o, t->quirks == NULL ? "" : t->quirks, problem))
         return false;
     at(problem, "pace", 0, t->pace);
     o->is_paced = t->pace == NULL ? is_paced_by_default : strcasecmp(t->pace, "on") == 0;
     return t->pace == NULL || o->is_paced || strcasecmp(t->pace, "off") == 0 || wrong(problem, "expected on or off");
+}
+
+void setup_started(const setup *s, instrument *ins)
+{
+    kept_state k = s->kept;
+    for (uint8_t i = 0; i < s->drive_count && s->kind == DR_MPC; i++) /* --angle may have said otherwise */
+        k.drives[i].rear = (uint8_t)((k.drives[i].rear & ~(DR_DIAGONALS - 1u)) | s->drives[i].diagonal);
+    if (s->was_kept)
+        kept_switches(&k, ins);
 }
 
 void setup_apply(const setup *s, instrument *ins, dr_drive *drives)

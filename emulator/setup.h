@@ -5,6 +5,7 @@
 #define SETUP_H
 
 #include "instrument.h" /* dr_controller, dr_drive */
+#include "kept.h"       /* what was kept of it */
 #include "values.h"     /* WHY_ROOM */
 
 #include "dr_words.h" /* dr_quirk_id */
@@ -13,6 +14,7 @@
  * firmware. */
 typedef struct {
     const char *controller, *firmware, *home, *angle, *quirks, *pace;
+    const char *state; /* the file of what was kept; what is not written here stands there */
     const char *devices[DR_PORTS], *positions[DR_PORTS], *works[DR_PORTS];
     unsigned device_count, position_count, work_count;
 } setup_text;
@@ -28,6 +30,9 @@ typedef struct {
     uint8_t byte_quirks;          /* INSTRUMENT_* */
     uint16_t quirk_ids;           /* the same, by name: bit 1 << dr_quirk_id */
     bool is_paced;
+    const char *state; /* where it is kept; NULL: nowhere */
+    bool was_kept;     /* there is such a file, and this is what stands in it */
+    kept_state kept;
 } setup;
 
 /* What is wrong with a text: which one it is ("device", the second: index 1), how it reads, and what was expected. */
@@ -42,6 +47,8 @@ typedef struct {
 bool setup_read(const setup_text *text, bool is_paced_by_default, setup *out, setup_problem *problem);
 /* An instrument of this kind, not yet started. Its drives are drives[], DR_PORTS of them. */
 void setup_apply(const setup *s, instrument *ins, dr_drive *drives);
+/* ... and when it has been started. */
+void setup_started(const setup *s, instrument *ins);
 
 /* A quirk by its name, on or off. False: why[] tells what was expected. */
 bool setup_has_quirk(const instrument *ins, dr_quirk_id id);

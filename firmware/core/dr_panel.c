@@ -493,7 +493,7 @@ static void forget(dr_panel *p)
                                         .right = p->drives[i].right};
 }
 
-static void read_switches(dr_panel *p)
+void dr_panel_read_switches(dr_panel *p)
 {
     dr_controller *c = p->controller;
     p->inside_read = p->inside;
@@ -517,7 +517,7 @@ void dr_panel_power(dr_panel *p, dr_us now, bool on)
         return;
     forget(p);
     if (on)
-        read_switches(p);
+        dr_panel_read_switches(p);
     (void)dr_controller_poke(p->controller, now, &(dr_hand){.what = on ? DR_HAND_POWER_ON : DR_HAND_POWER_OFF});
 }
 

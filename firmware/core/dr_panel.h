@@ -130,6 +130,8 @@ bool dr_panel_switch(dr_panel *p, dr_switches bank, uint8_t drive, uint8_t numbe
 bool dr_panel_switch_is_on(const dr_panel *p, dr_switches bank, uint8_t drive, uint8_t number);
 /* The mains switch. Where there is a panel, power goes through here, so that the switches are read. */
 void dr_panel_power(dr_panel *p, dr_us now, bool on);
+/* Reads the switches as power-up does: for an owner that has set them before a controller's start. */
+void dr_panel_read_switches(dr_panel *p);
 
 void dr_panel_settle(dr_panel *p, dr_us now);
 bool dr_panel_due(const dr_panel *p, dr_us *when);
