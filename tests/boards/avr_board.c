@@ -352,7 +352,7 @@ static void serve(const char *link_path, bool flat_out)
 /* -- Pins ------------------------------------------------------------------------------------------------------------ */
 
 static uint8_t grounded[128]; /* by the port's letter */
-static const char *watched = "";
+static char nothing[] = "", *watched = nothing;
 
 /* Connects the pins that are named there to ground, or leaves them to their pull-ups. */
 static void connect_pins(const char *pins, bool to_ground)
@@ -381,10 +381,10 @@ static void pin_changes(avr_irq_t *irq, uint32_t value, void *name)
 
 static void watch_pins(void)
 {
-    for (const char *pins = watched; pins[0] != '\0' && pins[1] != '\0'; pins += 2) {
+    for (char *pins = watched; pins[0] != '\0' && pins[1] != '\0'; pins += 2) {
         const uint32_t port = (uint8_t)pins[0];
         avr_irq_t *pin = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), pins[1] - '0');
-        avr_irq_register_notify(pin, pin_changes, (void *)(uintptr_t)pins);
+        avr_irq_register_notify(pin, pin_changes, pins);
     }
 }
 
@@ -394,7 +394,8 @@ static void pull_up_pins(void)
     for (char port = 'A'; port <= 'L'; port++)
         for (char bit = '0'; bit <= '7'; bit++) {
             const char name[] = {port, bit, '\0'};
-            avr_irq_t *const irq = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), bit - '0');
+            const uint32_t letter = (uint8_t)port;
+            avr_irq_t *const irq = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(letter), bit - '0');
             if (irq != NULL && strstr(watched, name) == NULL && (grounded[(uint8_t)port] >> (bit - '0') & 1) == 0) {
                 avr_raise_irq(irq, 0);
                 avr_raise_irq(irq, 1);

@@ -49,7 +49,7 @@ static void log_byte(avr_irq_t *irq, uint32_t value, void *unused)
         (void)printf("%u %s\n", now(), log_line);
 }
 
-static avr_irq_t *uart(char name, int irq)
+static avr_irq_t *uart(uint32_t name, int irq)
 {
     uint32_t flags = 0;
     (void)avr_ioctl(board, AVR_IOCTL_UART_SET_FLAGS(name), &flags);

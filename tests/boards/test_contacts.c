@@ -4,13 +4,20 @@
 
 #include "unity.h"
 
-#include <stdlib.h>
-
 static dr_contacts buttons;
 static dr_encoder encoder;
+static uint32_t chance;
+
+/* 0 to below `range`; the same numbers in each run. */
+static unsigned any(unsigned range)
+{
+    chance = chance * UINT32_C(1664525) + UINT32_C(1013904223);
+    return (unsigned)(chance >> 16) % range;
+}
 
 void setUp(void)
 {
+    chance = 1;
     dr_contacts_init(&buttons, 0);
     encoder = (dr_encoder){0, 0};
 }
@@ -40,12 +47,11 @@ static void test_what_lasts_for_seven_looks_is_nothing(void)
 /* However a contact chatters between two states, it is told once, and when it has been quiet for eight looks. */
 static void test_bouncing_of_any_pattern_is_one_change(void)
 {
-    srand(1);
     for (unsigned round = 0; round < 1000; round++) {
         const bool closes = buttons.closed == 0;
         unsigned changes = 0, quiet = 0;
         for (unsigned look = 0; look < 6; look++)
-            changes += dr_contacts_look(&buttons, (uint16_t)(rand() % 2)) != 0;
+            changes += dr_contacts_look(&buttons, (uint16_t)any(2)) != 0;
         TEST_ASSERT_EQUAL(0, changes);
         while (dr_contacts_look(&buttons, closes) == 0)
             TEST_ASSERT_LESS_THAN(DR_LOOKS, ++quiet);
@@ -98,11 +104,10 @@ static void test_half_a_detent_and_back_is_none(void)
 /* At each edge one contact may be seen either way any number of times: the sum is what was turned. */
 static void test_bouncing_adds_nothing(void)
 {
-    srand(2);
     long sum = 0;
     for (unsigned at = 0; at < 4000; at++) {
-        for (int bounces = rand() % 6; bounces > 0; bounces--)
-            sum += see(at + (unsigned)rand() % 2u);
+        for (unsigned bounces = any(6); bounces > 0; bounces--)
+            sum += see(at + any(2));
         sum += see(at + 1u);
     }
     TEST_ASSERT_EQUAL(1000, sum);

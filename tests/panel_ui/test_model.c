@@ -222,6 +222,14 @@ static void test_an_order_is_carried_out_or_refused(void)
     TEST_ASSERT_EQUAL_STRING("'x': expected something else", why);
 }
 
+static void repeated(char *out, size_t room, const char *before, const char *what, unsigned times, const char *behind)
+{
+    size_t length = (size_t)snprintf(out, room, "%s", before);
+    for (unsigned i = 0; i < times; i++)
+        length += (size_t)snprintf(out + length, room - length, "%s", what);
+    (void)snprintf(out + length, room - length, "%s", behind);
+}
+
 static void test_what_no_emulator_says_harms_nobody(void)
 {
     static const char *const lines[] = {
@@ -253,18 +261,15 @@ static void test_what_no_emulator_says_harms_nobody(void)
     }
     TEST_ASSERT_FALSE(model_active(&m)->is_on_leg);
     TEST_ASSERT_EQUAL(1, model_active(&m)->path_count);
-    char state[4096] = "{\"controllers\":[{\"name\":\"left\",\"controller\":\"mpc\",\"active\":99,\"devices\":[";
-    for (unsigned i = 0; i < 40; i++)
-        (void)strcat(state, "{\"model\":\"MP-225\",\"position_steps\":[1,2,3]},");
-    (void)strcat(state, "{}]}]}");
-    TEST_ASSERT_EQUAL(MODEL_STATE, take(state));
+    char line[4096];
+    repeated(line, sizeof line,
+             "{\"controllers\":[{\"name\":\"left\",\"controller\":\"mpc\",\"active\":99,\"devices\":[",
+             "{\"model\":\"MP-225\",\"position_steps\":[1,2,3]},", 40, "{}]}]}");
+    TEST_ASSERT_EQUAL(MODEL_STATE, take(line));
     TEST_ASSERT_EQUAL(DR_PORTS, m.device_count);
     TEST_ASSERT_EQUAL(0, m.active);
-    char down[2000] = "{\"screen\":\"red\",\"down\":[\"home\"";
-    for (unsigned i = 0; i < 100; i++)
-        (void)strcat(down, ",\"button\"");
-    (void)strcat(down, "]}");
-    TEST_ASSERT_EQUAL(MODEL_PANEL, take(down));
+    repeated(line, sizeof line, "{\"screen\":\"red\",\"down\":[\"home\"", ",\"button\"", 100, "]}");
+    TEST_ASSERT_EQUAL(MODEL_PANEL, take(line));
     TEST_ASSERT_LESS_THAN(sizeof m.down, strlen(m.down));
 }
 
