@@ -1,7 +1,6 @@
 #include "dr_guard_rooms.h"
 
 #define LINE_KEEPS_US MS(100) /* a frame of 14 bytes takes 2.4 ms; a USB converter's latency is 16 ms */
-#define LINE_PAUSE_US MS(35)  /* within the 'S' of an MPC-200: 30 ms [M note 10], and some */
 #define LINE_HEAD 2u          /* bytes before that pause: 'S' and the speed */
 #define RATE_TOKENS 20u
 #define EVENTS_MAX 16u /* at most so many in one call; a caller who comes that late is due again at once */
@@ -62,7 +61,7 @@ static void happen(dr_guard *g, uint8_t timer, dr_us now)
 static bool earliest(const dr_guard *g, uint8_t *timer)
 {
     bool any = false;
-    uint16_t left = g->running;
+    uint16_t left = g->running & ((1u << DR_TIMERS) - 1u); /* a flipped bit is no timer */
     for (uint8_t i = 0; left != 0; i++, left >>= 1)
         if ((left & 1u) != 0 && (!any || dr_us_before(g->at[i], g->at[*timer]))) {
             *timer = i;
@@ -159,6 +158,8 @@ size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room)
         if (g->stops_out > 0 && !is_leaving(g)) {
             g->stops_out--;
             bytes[count++] = DR_INTERRUPT;
+        } else if (g->out_at < g->out_ready && g->out_at == 0 && g->task == TASK_SEND && dr_g_is_late(g, now)) {
+            dr_g_check_again(g, now);
         } else if (g->out_at < g->out_ready) {
             bytes[count++] = g->out[g->out_at++];
             if (g->out_at == g->out_count)
@@ -230,7 +231,7 @@ void dr_guard_get_status(const dr_guard *g, dr_guard_status *out)
     }
     *out = (dr_guard_status){.state = (uint8_t)dr_g_state_of(g), .fault = g->fault, .needs = dr_g_needs_of(g)};
     if (g->limits != NULL) {
-        const bool outside = g->position_known &&
+        const bool outside = g->position_known && g->task == TASK_NONE &&
                              dr_judge_place(g->limits, g->scene.drive, g->scene.start_steps).reason != DR_REASON_NONE;
         if (outside && !is_on(g, DR_INPUT_ESCAPE))
             out->needs |= DR_NEEDS_INSIDE;
@@ -277,6 +278,7 @@ void dr_guard_init(dr_guard *g, const dr_limits *limits, dr_record *ring, uint16
     dr_log_init(&g->log, ring, size);
     g->limits = limits != NULL && dr_limits_check(limits, &problem) ? limits : NULL;
     g->limits_crc = g->limits == NULL ? 0 : dr_limits_crc(limits);
+    g->limits_memory_crc = g->limits == NULL ? 0 : dr_crc32c(0, (const uint8_t *)limits, sizeof *limits);
     g->tokens = RATE_TOKENS;
     g->last_refusal = dr_g_because(DR_REASON_NONE);
     dr_g_set_mode(g, MODE_LOCKED);

@@ -67,7 +67,7 @@ typedef enum {
 enum {
     DR_NEEDS_LIMITS = 1u << 0,   /* valid limits */
     DR_NEEDS_IDENTITY = 1u << 1, /* proof, or CONFIRM where the reply fits both controllers */
-    DR_NEEDS_INSIDE = 1u << 2,   /* the tip within the box and clear, or ESCAPE (as of the last reading) */
+    DR_NEEDS_INSIDE = 1u << 2, /* the tip within the box and clear, or ESCAPE (as of the last reading; told at rest) */
     DR_NEEDS_STOP_RELEASED = 1u << 3,
     DR_NEEDS_DEVICE = 1u << 4, /* the device link up */
     DR_NEEDS_LOG = 1u << 5,    /* a log that works */
@@ -100,7 +100,7 @@ typedef struct {
 typedef enum {
     DR_EVENT_START,       /* position[0] = dr_limits_crc, position[1] = revision; code = dr_start */
     DR_EVENT_STATE,       /* the state changed; code = dr_fault */
-    DR_EVENT_ALLOWED,     /* host frame -> controller: bytes */
+    DR_EVENT_ALLOWED,     /* host frame -> controller: bytes; code = 1: again, because it did not leave in time */
     DR_EVENT_REFUSED,     /* host frame refused: bytes, code = dr_reason, axis, item; position = where the tip was */
     DR_EVENT_DROPPED,     /* host bytes that were no frame: the first bytes; code = dr_reason; count = how many */
     DR_EVENT_REPLY,       /* controller -> host, as much as fits: bytes, code = dr_op */
@@ -165,8 +165,8 @@ enum {
 
 typedef struct {
     /* everything here belongs to dr_guard; others ask dr_guard_get_status() */
-    const dr_limits *limits; /* NULL: none, or no longer trusted */
-    uint32_t limits_crc;
+    const dr_limits *limits;                /* NULL: none, or no longer trusted */
+    uint32_t limits_crc, limits_memory_crc; /* of what they say; of the bytes that they are, which is faster */
     dr_log log;
     uint8_t mode, fault, shown_state;
     uint16_t inputs; /* bit per dr_input */
@@ -216,6 +216,7 @@ typedef struct {
     dr_path path; /* of the motion under way */
     uint8_t path_drive;
     bool end_told, small; /* the motion's CR is there; so short that it may never come */
+    uint8_t late;         /* how often its reading was too old when it should have left */
     uint8_t tokens;       /* motions that may start now */
     uint8_t noise, quarantined[DR_RECORD_TEXT], quarantined_count;
 

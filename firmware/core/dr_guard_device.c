@@ -1,15 +1,21 @@
-/* The conversation with the controller: the guard's own readings, replies for the host, bytes that nobody asked for. See dr_guard_rooms.h. */
+/* The conversation with the controller: readings, replies to the host, noise. See dr_guard_rooms.h. */
 #include "dr_guard_rooms.h"
 
 #define REPLY_GAP_US MS(100) /* between two bytes of one reply */
-/* A TRIO may be calibrating by itself: a minute, in pauses that grow by a second. Ten queries and the ^C after a reset are
- * fewer than the 12 bytes that a controller waits for if the guard before died within an 'S': whole, it would move. */
-#define PROVE_RETRY_US MS(1000)
 #define NOISE_US MS(1000)
 #define NOISE_MAX 16u
 
+/* Before anything else of the controller's is told, so that the log keeps to the order of the line. */
+void dr_g_flush_quarantined(dr_guard *g, dr_us now)
+{
+    if (g->quarantined_count > 0)
+        dr_g_log_bytes(g, now, DR_EVENT_QUARANTINED, 0, DR_OP_NONE, g->quarantined, g->quarantined_count);
+    g->quarantined_count = 0;
+}
+
 static void use_reading(dr_guard *g, dr_us now, const dr_reply *reply)
 {
+    dr_g_flush_quarantined(g, now);
     dr_record record = dr_g_record_of(g, now, DR_EVENT_READING, 0);
     record.item = reply->value;
     copy_point(record.position_steps, reply->steps);
@@ -56,6 +62,7 @@ static void give_up_reading(dr_guard *g, dr_us now, dr_fault fault)
 
 static void bad_reading(dr_guard *g, dr_us now)
 {
+    dr_g_flush_quarantined(g, now);
     dr_g_log_bytes(g, now, DR_EVENT_IMPLAUSIBLE, 0, DR_OP_NONE, g->read, g->read_have);
     if (g->read_again) {
         give_up_reading(g, now, DR_FAULT_IMPLAUSIBLE);
@@ -78,12 +85,6 @@ static void push_reading(dr_guard *g, dr_us now, uint8_t byte)
         use_reading(g, now, &reply);
     else
         bad_reading(g, now);
-}
-
-void dr_g_flush_quarantined(dr_guard *g, dr_us now)
-{
-    dr_g_log_bytes(g, now, DR_EVENT_QUARANTINED, 0, DR_OP_NONE, g->quarantined, g->quarantined_count);
-    g->quarantined_count = 0;
 }
 
 /* Never forwarded: it would look like the answer to the next command. */
@@ -160,6 +161,7 @@ static void push_passed(dr_guard *g, dr_us now, uint8_t byte)
         dr_g_set_timer(g, DR_TIMER_TASK, now + REPLY_GAP_US);
         return;
     }
+    dr_g_flush_quarantined(g, now);
     dr_g_log_bytes(g, now, DR_EVENT_REPLY, g->command.op, g->command.op, g->reply,
                    g->reply_have < DR_REPLY_MAX ? g->reply_have : DR_REPLY_MAX);
     dr_g_end_task(g);
@@ -231,6 +233,7 @@ void dr_g_pass(dr_guard *g, dr_us now, const dr_command *command, const dr_reque
     g->forwarded++;
     dr_g_put_out(g, frame, length, length);
     dr_g_set_timer(g, DR_TIMER_TASK, now + REPLY_TIMEOUT_US);
+    dr_g_flush_quarantined(g, now);
     dr_g_log_bytes(g, now, DR_EVENT_ALLOWED, 0, command->op, frame, length);
 }
 

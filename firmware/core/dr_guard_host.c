@@ -64,9 +64,13 @@ static void take_frame(dr_guard *g, dr_us now, const dr_command *command, const 
         }
     } else if ((command->is & DR_IS_MOTION) == 0) {
         dr_g_pass(g, now, command, &request, frame);
+    } else if (!dr_g_is_intact(g)) {
+        dr_g_refuse(g, now, command, frame, dr_g_because(DR_REASON_DAMAGED));
+        dr_g_fall_back(g, now);
     } else {
         g->command = *command;
         g->request = request;
+        g->late = 0;
         memcpy(g->frame, frame, (size_t)1u + command->args);
         g->task = TASK_CHECK;
         dr_g_start_reading(g, now, FRAME_GAP_US);
@@ -108,7 +112,7 @@ void dr_g_push_host_byte(dr_guard *g, dr_us now, uint8_t byte)
         g->frame_began = now;
         g->tainted = false;
     }
-    g->tainted = g->tainted || g->task != TASK_NONE;
+    g->tainted = g->tainted || g->task != TASK_NONE || is_leaving(g);
     switch (dr_framer_push(&g->framer, kind_of(g), g->limits->firmware, byte, &command)) {
     case DR_FRAMED_WHOLE:
         take_frame(g, now, &command, g->framer.bytes);

@@ -4,6 +4,8 @@
 #define SMALL_MOVE_US MS(100) /* 15 microsteps at the slowest speed take 15 ms */
 #define SMALL_MOVE_STEPS 16u  /* an MPC-200 ignores shorter moves, without a CR ([P], small-move-silent) */
 #define CALIBRATION_US MS(60000)
+#define FRAME_US 2500u /* 14 bytes of a TRIO take 2,431 us on the line */
+#define LATE_MAX 20u
 
 /* How long the motion may last at most: one and a half times its way at the slowest plausible speed, and 2 s. */
 dr_us dr_g_longest_us(const dr_guard *g)
@@ -44,10 +46,6 @@ void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply)
         dr_g_fail(g, now, DR_FAULT_POSITION_JUMP);
         return;
     }
-    if (!dr_g_is_intact(g)) {
-        dr_g_fall_back(g, now);
-        return;
-    }
     g->scene.may_calibrate = is_on(g, DR_INPUT_MAY_CALIBRATE);
     g->scene.in_tissue = is_on(g, DR_INPUT_IN_TISSUE);
     const dr_verdict verdict = dr_judge_motion(g->limits, &g->scene, &g->command, &g->request);
@@ -61,15 +59,39 @@ void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply)
     g->small = is_small(g);
     g->end_told = false;
     g->forwarded++;
-    g->tokens--;
-    if (!is_running(g, DR_TIMER_RATE))
-        dr_g_set_timer(g, DR_TIMER_RATE, now + RATE_US);
+    if (g->late == 0) { /* one token for each motion, however often it is read for */
+        g->tokens--;
+        if (!is_running(g, DR_TIMER_RATE))
+            dr_g_set_timer(g, DR_TIMER_RATE, now + RATE_US);
+    }
     const uint8_t length = (uint8_t)(1u + g->command.args);
     dr_g_put_out(g, g->frame, length, 0);
     dr_g_set_timer(g, DR_TIMER_SEND, now + FRAME_GAP_US);
     dr_g_start_idling(g, now);
     g->task = TASK_SEND;
-    dr_g_log_bytes(g, now, DR_EVENT_ALLOWED, 0, g->command.op, g->frame, length);
+    dr_g_log_bytes(g, now, DR_EVENT_ALLOWED, g->late > 0, g->command.op, g->frame, length);
+}
+
+/* The margin reckons with what a knob can do from the reading until the motion begins. Who comes later, a suspended program or a
+ * slow machine, would let it begin somewhere else. */
+bool dr_g_is_late(const dr_guard *g, dr_us now)
+{
+    const dr_us until_it_begins = FRAME_US + (g->command.op == DR_OP_MPC_LINE ? LINE_PAUSE_US : 0);
+    const dr_us window = g->command.op == DR_OP_MPC_LINE ? DR_WINDOW_MPC_LINE_US : DR_WINDOW_US;
+    return !has_rig(g, DR_RIG_KNOBS_LOCKED) && now - g->position_at > window - until_it_begins;
+}
+
+void dr_g_check_again(dr_guard *g, dr_us now)
+{
+    dr_g_withdraw(g);
+    dr_g_end_task(g);
+    g->forwarded--;
+    if (++g->late > LATE_MAX) {
+        dr_g_refuse_pending(g, now, dr_g_because(DR_REASON_NO_POSITION));
+        return;
+    }
+    g->task = TASK_CHECK;
+    dr_g_start_reading(g, now, 0);
 }
 
 /* Where the motion may rightly end: at its target; without Y where homing leaves it out; where it began, if it was so short

@@ -29,7 +29,8 @@ static void lose_host(dr_guard *g, dr_us now)
     g->host_chose = false;
     if (at_rest && has_rig(g, DR_RIG_STAYS_ARMED))
         return;
-    if (g->limits->host_loss == DR_HOST_LOSS_FINISH && g->task != TASK_CHECK && g->mode == MODE_ARMED)
+    const bool begun = g->task != TASK_CHECK && (g->task != TASK_SEND || g->out_at > 0);
+    if (g->limits->host_loss == DR_HOST_LOSS_FINISH && begun && g->mode == MODE_ARMED)
         dr_g_set_mode(g, MODE_DISARMED);
     else
         dr_g_disarm(g, now, DR_STOP_HOST_LOST);
@@ -79,6 +80,17 @@ uint16_t dr_g_needs_of(const dr_guard *g)
     return (uint16_t)needs;
 }
 
+/* Its power was off: whatever was on its way to it is gone, half a frame too. Who is there? */
+static void give_power_back(dr_guard *g, dr_us now)
+{
+    g->cut = false;
+    dr_g_end_task(g);
+    g->out_at = g->out_count; /* not half of anything any more */
+    dr_g_withdraw(g);
+    dr_g_lock(g, DR_FAULT_NONE);
+    dr_g_start_proof(g, now);
+}
+
 static void key_turned_on(dr_guard *g, dr_us now)
 {
     const bool latched = g->mode == MODE_FAULT || g->mode == MODE_STOPPED;
@@ -90,11 +102,8 @@ static void key_turned_on(dr_guard *g, dr_us now)
         g->fault = DR_FAULT_NONE;
         g->buzzer = false;
         dr_g_set_mode(g, MODE_DISARMED);
-        if (g->cut && !has_rig(g, DR_RIG_CALIBRATES_AT_POWER_ON)) { /* power comes back: who is there? */
-            g->cut = false;
-            dr_g_lock(g, DR_FAULT_NONE);
-            dr_g_start_proof(g, now);
-        }
+        if (g->cut && !has_rig(g, DR_RIG_CALIBRATES_AT_POWER_ON))
+            give_power_back(g, now);
     }
 }
 
@@ -166,11 +175,8 @@ static void confirm_pressed(dr_guard *g, dr_us now)
     }
     if (g->ambiguous)
         dr_g_identity_proved(g);
-    if (g->cut && g->mode == MODE_DISARMED) { /* somebody has made room for the calibration at power-on */
-        g->cut = false;
-        dr_g_lock(g, DR_FAULT_NONE);
-        dr_g_start_proof(g, now);
-    }
+    if (g->cut && g->mode == MODE_DISARMED) /* somebody has made room for the calibration at power-on */
+        give_power_back(g, now);
 }
 
 void dr_g_input_changed(dr_guard *g, dr_us now, dr_input what, bool on)

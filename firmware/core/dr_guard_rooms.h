@@ -48,16 +48,20 @@ typedef enum {
 } dr_read_phase;
 
 #define MS(ms) ((dr_us)(ms)*1000u)
-#define FRAME_GAP_US MS(2) /* between two frames to the controller */
+#define FRAME_GAP_US MS(2)   /* between two frames to the controller */
+#define LINE_PAUSE_US MS(35) /* within the 'S' of an MPC-200: 30 ms [M note 10], and some */
 #define REPLY_TIMEOUT_US MS(2000)
 #define QUIET_US MS(100)
 #define REST_APART_US MS(100) /* between two readings that must agree */
 #define PROOF_OF_REST_US MS(1000)
 #define REPEAT_STOP_US MS(150)
+#define RATE_US MS(50) /* for one more motion */
+/* A TRIO may be calibrating by itself: a minute, in pauses that grow by a second. Ten queries and the ^C after a reset are
+ * fewer than the 12 bytes that a controller waits for if the guard before died within an 'S': whole, it would move. */
+#define PROVE_RETRY_US MS(1000)
 #define PROVE_ATTEMPTS 10u
-#define RATE_US MS(50)
 
-/* -- Small questions, asked everywhere ---------------------------------------------------------------------------------------------- */
+/* -- Small questions, asked everywhere ---------------------------------------------------------------------------------- */
 
 static inline dr_kind kind_of(const dr_guard *g) { return (dr_kind)g->limits->kind; }
 static inline bool has_rig(const dr_guard *g, uint16_t rig) { return (g->limits->rig & rig) != 0; }
@@ -143,6 +147,9 @@ void dr_g_fall_back(dr_guard *g, dr_us now); /* no limits afterwards */
 /* -- dr_guard_motion --------------------------------------------------------------------------------------------------- */
 
 void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply);
+bool dr_g_is_late(const dr_guard *g,
+                  dr_us now); /* a motion that has not begun to leave: is its reading too old by now? */
+void dr_g_check_again(dr_guard *g, dr_us now); /* reads anew, or refuses */
 dr_us dr_g_longest_us(const dr_guard *g);
 void dr_g_read_for_end(dr_guard *g, dr_us now, const dr_reply *reply);
 

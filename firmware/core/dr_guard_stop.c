@@ -107,10 +107,14 @@ void dr_g_fall_back(dr_guard *g, dr_us now)
     dr_g_withdraw(g);
     dr_g_lock(g, DR_FAULT_DAMAGED);
     g->limits = NULL;
-    g->running = 0;
+    g->running =
+        (uint16_t)(g->running & (is_leaving(g) ? 1u << DR_TIMER_SEND : 0u)); /* half a frame would swallow the ^C */
 }
 
-bool dr_g_is_intact(const dr_guard *g) { return dr_limits_crc(g->limits) == g->limits_crc; }
+bool dr_g_is_intact(const dr_guard *g)
+{
+    return dr_crc32c(0, (const uint8_t *)g->limits, sizeof *g->limits) == g->limits_memory_crc;
+}
 
 /* A fault. While something may move: it is stopped first. */
 void dr_g_fail(dr_guard *g, dr_us now, dr_fault fault)

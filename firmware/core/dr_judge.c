@@ -5,11 +5,6 @@
 #define MODE_LAST 9u /* [M table 9, 'L'] */
 #define LAST_LEVEL (DR_SPEED_LEVELS - 1u)
 
-/* From the answer to the query until the motion begins, a knob may move the tip: the gap on the wire and the frame, and on
- * an MPC-200 the pause within 'S'. */
-#define WINDOW_US 10000
-#define WINDOW_MPC_LINE_US 50000
-
 static const dr_verdict allowed = {DR_REASON_NONE, DR_AXES, DR_NO_ITEM, 0, 0};
 
 static bool is_allowed(dr_verdict verdict) { return verdict.reason == DR_REASON_NONE; }
@@ -203,7 +198,7 @@ dr_path dr_judge_path(const dr_limits *l, const dr_scene *scene, const dr_comman
 
 int32_t dr_judge_margin_q(const dr_limits *l, const dr_command *command)
 {
-    const int64_t window_us = command->op == DR_OP_MPC_LINE ? WINDOW_MPC_LINE_US : WINDOW_US;
+    const int64_t window_us = command->op == DR_OP_MPC_LINE ? DR_WINDOW_MPC_LINE_US : DR_WINDOW_US;
     if (has(l, DR_RIG_KNOBS_LOCKED))
         return l->margin_q;
     return l->margin_q + (int32_t)((l->knob_q_per_s * window_us + DR_US_PER_S - 1) / DR_US_PER_S);

@@ -12,6 +12,11 @@
 extern "C" {
 #endif
 
+/* From the answer to the guard's query until the motion begins, a knob may move the tip: the gap on the wire and the frame,
+ * and on an MPC-200 the pause within 'S'. The margin has room for that, and the guard keeps to it. */
+#define DR_WINDOW_US 10000
+#define DR_WINDOW_MPC_LINE_US 50000
+
 /* Why something was refused, or dropped. `limit` and `measured` of a verdict are in the units given here. */
 typedef enum {
     DR_REASON_NONE, /* allowed */

@@ -355,6 +355,13 @@ void bench_armed_mpc(void)
     bench_arm();
 }
 
+void limits_changed(void)
+{
+    rig.guard.limits_crc = dr_limits_crc(&rig.limits);
+    rig.guard.limits_memory_crc = dr_crc32c(0, (const uint8_t *)&rig.limits, sizeof rig.limits);
+    rig.guard.sealed = 0;
+}
+
 uint8_t keep_out(int32_t x0, int32_t x1, int32_t y0, int32_t y1, int32_t z0, int32_t z1)
 {
     const uint8_t item = rig.limits.obstacle_count++;

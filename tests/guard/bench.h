@@ -79,6 +79,8 @@ void bench_start(void);
 void bench_arm(void); /* key and ARM: IDLE afterwards */
 void bench_armed_trio(void);
 void bench_armed_mpc(void);
+/* After the test has changed rig.limits behind the guard's back, or has poked into rig.guard. */
+void limits_changed(void);
 /* Adds an obstacle to the limits of drive 0: um. */
 uint8_t keep_out(int32_t x0, int32_t x1, int32_t y0, int32_t y1, int32_t z0, int32_t z1);
 

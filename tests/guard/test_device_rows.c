@@ -404,8 +404,7 @@ static void row_48_ctrl_c_that_is_ignored(void)
 {
     fake_rig();
     rig.limits.rig |= DR_RIG_HAS_CUT;
-    rig.guard.limits_crc = dr_limits_crc(&rig.limits);
-    rig.guard.sealed = false;
+    limits_changed();
     fake.ignores_stop = true;
     fake.lasts = 5000000;
     fake_move(100);
@@ -433,8 +432,7 @@ static void a_rig_that_calibrates_at_power_on_gets_its_power_back_when_a_person_
 {
     fake_rig();
     rig.limits.rig |= DR_RIG_HAS_CUT | DR_RIG_CALIBRATES_AT_POWER_ON;
-    rig.guard.limits_crc = dr_limits_crc(&rig.limits);
-    rig.guard.sealed = false;
+    limits_changed();
     fake.ignores_stop = true;
     fake.lasts = 3000000;
     fake_move(100);
@@ -761,8 +759,7 @@ static void row_55_a_knob_is_no_faster_than_a_knob(void)
     for (size_t i = 0; i < sizeof turns / sizeof *turns; i++) {
         fake_rig();
         rig.limits.rig = 0; /* 5 mm/s: 40 microsteps a ms */
-        rig.guard.limits_crc = dr_limits_crc(&rig.limits);
-        rig.guard.sealed = false;
+        limits_changed();
         host_code('c');
         fake_ms(10);
         fake_ms(turns[i].after_ms - 10);

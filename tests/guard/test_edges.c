@@ -751,11 +751,9 @@ static void a_cut_needs_its_confirmation_after_the_fault_is_cleared(void)
 {
     by_hand_moving();
     rig.limits.rig |= DR_RIG_HAS_CUT | DR_RIG_CALIBRATES_AT_POWER_ON;
-    rig.guard.limits_crc = dr_limits_crc(&rig.limits);
-    rig.guard.sealed = false;
+    limits_changed();
     keep_out(20000, 20001, 20000, 20001, 20000, 20001);
-    rig.guard.limits_crc = dr_limits_crc(&rig.limits);
-    rig.guard.sealed = false;
+    limits_changed();
     host_code(3);
     run_ms(1200);
     expect_fault(DR_FAULT_UNSTOPPABLE);
@@ -933,10 +931,182 @@ static void who_asks_for_the_hosts_bytes_settles_what_is_due(void)
     expect_state(DR_GUARD_DISARMED);
 }
 
+/* -- What a model checker found ------------------------------------------------------------------------------------------- */
+
+static dr_us clock_after_us(uint32_t us)
+{
+    rig.now += us;
+    return guard_clock();
+}
+
+/* A setting that is half out when noise ends its task: what the host sends next must not take its place in out[]. */
+static void half_a_setting_is_not_overwritten(void)
+{
+    uint8_t byte, query = 'C';
+    bench_armed_trio();
+    rig.framer.have = rig.framer.want = 0;
+    const uint8_t angle[] = {'A', 30}, noise[20] = {'?'};
+    dr_guard_push_host(&rig.guard, guard_clock(), angle, 2);
+    TEST_ASSERT_EQUAL(1, dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 1));
+    TEST_ASSERT_EQUAL('A', byte);
+    dr_guard_push_device(&rig.guard, clock_after_us(100), noise, sizeof noise);
+    expect_fault(DR_FAULT_DEVICE_NOISE);
+    dr_guard_push_host(&rig.guard, clock_after_us(100), &query, 1);
+    expect_refused(DR_REASON_BUSY);
+    TEST_ASSERT_EQUAL(1, dr_guard_pull_device(&rig.guard, clock_after_us(100), &byte, 1));
+    TEST_ASSERT_EQUAL(30, byte);
+    TEST_ASSERT_EQUAL(0, dr_guard_pull_device(&rig.guard, clock_after_us(100), &byte, 1));
+    dr_guard_push_host(&rig.guard, clock_after_us(100), &query, 1);
+    TEST_ASSERT_EQUAL(1, dr_guard_pull_device(&rig.guard, clock_after_us(100), &byte, 1));
+    TEST_ASSERT_EQUAL('C', byte);
+}
+
+/* Damaged limits found in the pause within 'S': its rest and then the ^C must still leave. */
+static void damage_in_the_pause_within_s_finishes_the_frame_and_stops(void)
+{
+    bench_armed_mpc();
+    host_line(15, 81600, 80000, 80000);
+    run_ms(15);
+    TEST_ASSERT_TRUE(dr_guard_is_mid_frame(&rig.guard));
+    rig.limits.margin_q++;
+    TEST_ASSERT_FALSE(dr_guard_self_check(&rig.guard, guard_clock()));
+    const uint32_t stops = wire_stops();
+    run_ms(100);
+    TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+    TEST_ASSERT_EQUAL(stops + 1, wire_stops());
+    TEST_ASSERT_EQUAL(DR_STATE_REST, rig.controller.state);
+    host_code(3);
+    run_ms(10);
+    TEST_ASSERT_EQUAL(stops + 2, wire_stops());
+}
+
+/* The power comes back while a setting of the host's waits to leave, or is half out: it is forgotten. */
+static void power_that_comes_back_finds_nothing_on_its_way(void)
+{
+    for (unsigned half_out = 0; half_out < 2; half_out++) {
+        uint8_t byte;
+        const uint8_t angle[] = {'A', 30};
+        bench_trio();
+        rig.limits.rig |= DR_RIG_HAS_CUT | DR_RIG_CALIBRATES_AT_POWER_ON;
+        bench_start();
+        bench_arm();
+        host_axis('x', 41600);
+        run_ms(20);
+        stop_input(true);
+        run_ms(2000);
+        stop_input(false);
+        run_ms(30);
+        clear_fault();
+        expect_state(DR_GUARD_DISARMED);
+        TEST_ASSERT_TRUE(status().cut);
+        dr_guard_push_host(&rig.guard, guard_clock(), angle, 2);
+        TEST_ASSERT_EQUAL(half_out, dr_guard_pull_device(&rig.guard, guard_clock(), &byte, half_out));
+        dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_CONFIRM, true);
+        expect_state(DR_GUARD_LOCKED);
+        TEST_ASSERT_EQUAL(0, dr_guard_pull_device(&rig.guard, clock_after_us(1000), &byte, 1));
+        run_ms(1200);
+        expect_state(DR_GUARD_DISARMED);
+    }
+}
+
+/* Only what has begun may finish without its host. */
+static void a_motion_that_has_not_begun_does_not_begin_without_its_host(void)
+{
+    bench_trio();
+    rig.limits.host_loss = DR_HOST_LOSS_FINISH;
+    bench_start();
+    bench_arm();
+    host_line(15, 44000, 40000, 40000);
+    while (rig.guard.out_count < 14)
+        run_us(50);
+    TEST_ASSERT_EQUAL(0, rig.guard.out_at);
+    cables(false, true);
+    run_ms(1000);
+    TEST_ASSERT_EQUAL(0, rig.motions);
+    expect_refused(DR_REASON_CANCELLED);
+    expect_state(DR_GUARD_DISARMED);
+    expect_tip(0, 40000, 40000, 40000);
+}
+
+/* A program that is suspended between the reading and the motion: a knob may have gone anywhere. */
+static void row_59_a_reading_that_is_too_old_is_taken_again(void)
+{
+    for (int kind = DR_TRIO; kind <= DR_MPC; kind++)
+        for (unsigned late_ms = 1; late_ms <= 21; late_ms += 5) {
+            if (kind == DR_TRIO)
+                bench_trio();
+            else
+                bench_mpc();
+            rig.limits.rig = 0;
+            bench_start();
+            bench_arm();
+            const uint32_t at = kind == DR_TRIO ? 40000 : 80000;
+            host_line(15, at + 800, at, at);
+            while (rig.guard.out_count < 14)
+                run_us(50);
+            const uint32_t queries = rig.wire_count;
+            rig.now +=
+                1000 * late_ms; /* to 7.5 ms after the reading it may begin; to 12.5 ms with the pause within 'S' */
+            run_ms(300);
+            expect_cr();
+            expect_tip(0, at + 800, at, at);
+            const bool again = late_ms > (kind == DR_TRIO ? 6 : 11);
+            TEST_ASSERT_EQUAL(again ? 'C' : 'S', rig.wire[queries] == 'c' ? 'C' : rig.wire[queries]);
+            TEST_ASSERT_EQUAL(again, last_record(DR_EVENT_ALLOWED)->code);
+            TEST_ASSERT_EQUAL(1, status().forwarded);
+        }
+    bench_trio(); /* always late */
+    rig.limits.rig = 0;
+    bench_start();
+    bench_arm();
+    host_line(15, 40800, 40000, 40000);
+    for (int i = 0; i < 100 && status().refused == 0; i++) {
+        for (int steps = 0; rig.guard.out_count < 14 && steps < 1000; steps++)
+            run_us(50);
+        rig.now += 20000;
+        run_us(50);
+    }
+    expect_refused(DR_REASON_NO_POSITION);
+    expect_state(DR_GUARD_IDLE);
+    TEST_ASSERT_EQUAL(0, status().forwarded);
+    TEST_ASSERT_EQUAL(0, rig.motions);
+    run_ms(2000);
+    TEST_ASSERT_TRUE(rig.guard.tokens <= 20);
+}
+
+/* The log is in the order of the line: what came before a reading is told before it, and nothing is told twice. */
+static void what_is_put_aside_is_logged_before_what_follows(void)
+{
+    uint32_t quarantined = 0, readings = 0;
+    bench_armed_trio();
+    host_line(0, 44000, 40000, 40000);
+    run_ms(100);
+    rig.log_count = 0;
+    host_code(3);
+    run_ms(3000);
+    for (uint32_t i = 0; i < rig.log_count; i++) {
+        quarantined += rig.log[i].event == DR_EVENT_QUARANTINED;
+        readings += rig.log[i].event == DR_EVENT_READING;
+        if (rig.log[i].event == DR_EVENT_QUARANTINED) {
+            TEST_ASSERT_EQUAL(0, readings);
+            TEST_ASSERT_EQUAL(1, rig.log[i].count);
+            TEST_ASSERT_EQUAL_HEX8(DR_CR, rig.log[i].bytes[0]);
+        }
+    }
+    TEST_ASSERT_EQUAL(1, quarantined);
+    TEST_ASSERT_EQUAL(2, readings);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(who_asks_for_the_hosts_bytes_settles_what_is_due);
+    RUN_TEST(what_is_put_aside_is_logged_before_what_follows);
+    RUN_TEST(half_a_setting_is_not_overwritten);
+    RUN_TEST(damage_in_the_pause_within_s_finishes_the_frame_and_stops);
+    RUN_TEST(power_that_comes_back_finds_nothing_on_its_way);
+    RUN_TEST(a_motion_that_has_not_begun_does_not_begin_without_its_host);
+    RUN_TEST(row_59_a_reading_that_is_too_old_is_taken_again);
     RUN_TEST(an_ignored_move_forgets_no_old_target);
     RUN_TEST(the_hosts_choice_of_a_drive_outlives_arming);
     RUN_TEST(a_cable_pulled_right_behind_a_frame_may_have_torn_it);
