@@ -172,7 +172,7 @@ bool kept_open(kept_file *f, const char *path, const kept_state *expected, char 
     f->path = expected == NULL ? strdup(path) : realpath(path, NULL); /* behind a symbolic link is the file itself */
     if (f->path == NULL || strlen(f->path) + sizeof NEW > PATH_MAX) {
         (void)snprintf(why, WHY_ROOM, "%s: %s", path, f->path == NULL ? strerror(errno) : strerror(ENAMETOOLONG));
-    } else if ((f->lock = link_lock(f->path)) < 0) {
+    } else if ((f->lock = link_lock_name(f->path)) < 0) {
         if (errno == EADDRINUSE)
             (void)snprintf(why, WHY_ROOM,
                            "%s: another emulator keeps its state there; stop that, or choose another file", path);

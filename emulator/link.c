@@ -72,7 +72,7 @@ static uint64_t digest(const char *name)
 }
 
 /* The same name in the same directory has the same lock however its path is spelled. */
-int link_lock(const char *link_path)
+int link_lock_name(const char *link_path)
 {
     char directory[PATH_MAX];
     struct stat is;
@@ -114,7 +114,7 @@ static bool make_locked(const char *link_path, const char *pts_path, char *why, 
 
 int link_make(const char *link_path, const char *pts_path, char *why, size_t room)
 {
-    const int lock = link_lock(link_path);
+    const int lock = link_lock_name(link_path);
     if (lock < 0 && errno == EADDRINUSE)
         (void)snprintf(why, room, "%s is in use by another emulator; stop that, or choose another path", link_path);
     else if (lock < 0)

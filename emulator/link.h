@@ -17,7 +17,7 @@
 int link_make(const char *link_path, const char *pts_path, char *why, size_t room);
 /* The lock alone, on any path: a descriptor that holds it as long as it is open. -1: errno is EADDRINUSE where somebody has
  * it. */
-int link_lock(const char *path);
+int link_lock_name(const char *path);
 /* Removes it, if it still leads to this port. */
 void link_remove(const char *link_path, const char *pts_path, int lock);
 
