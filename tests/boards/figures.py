@@ -124,13 +124,21 @@ def measure(arguments):
             for struct, symbol, count in (("dr_controller", "controller", 1), ("dr_drive", "drives", 4)):
                 size = re.search(rf"^\S+ (\S+) b {symbol}$", run(f"{tool}-nm", "-S", directory / f"{board}-mpc.elf"), re.M)
                 rows[f"{build} sizeof {struct}"] = int(size.group(1), 16) // count
-    cycles = run(arguments.avr_board, "--program", "atmega2560", Path(arguments.builds, "avr-mega/target-costs.elf"))
-    instructions = run(arguments.qemu, *"-M mps2-an385 -display none -monitor none -serial null -icount shift=10".split(),
-                       "-semihosting-config", "enable=on,target=native",
-                       "-kernel", Path(arguments.builds, "cortex-m/target-costs.elf"))
-    for unit, said in (("cycles", cycles), ("instructions", instructions)):
-        for name, work in re.findall(r"^((?:push|pull|due)\S*) (\d+)$", said, re.M):
-            rows[f"{unit} {name}"] = int(work)
+    for build, board in (("avr-mega", "mega"), ("cortex-m", "cortex-m")):
+        directory = Path(arguments.builds, build)
+        tool = "avr" if board == "mega" else "arm-none-eabi"
+        elf = directory / f"{board}-bridge.elf"
+        rows[f"{build}-bridge flash"], rows[f"{build}-bridge static-RAM"] = sections(tool, elf)
+        for root in ("dr_bridge_begin", "dr_bridge_step"):
+            rows[f"{build}-bridge stack-bound {root}"] = deepest_chain(tool, elf, directory, root, 2 if tool == "avr" else 0)
+    qemu = [arguments.qemu, *"-M mps2-an385 -display none -monitor none -serial null -icount shift=10".split(),
+            "-semihosting-config", "enable=on,target=native", "-kernel"]
+    for program in ("costs", "guard_costs"):
+        cycles = run(arguments.avr_board, "--program", "atmega2560", Path(arguments.builds, f"avr-mega/target-{program}.elf"))
+        instructions = run(*qemu, Path(arguments.builds, f"cortex-m/target-{program}.elf"))
+        for unit, said in (("cycles", cycles), ("instructions", instructions)):
+            for name, work in re.findall(r"^((?:push|pull|due|guard)\S*) (\d+)$", said, re.M):
+                rows[f"{unit} {name}"] = int(work)
     return rows
 
 
