@@ -190,6 +190,37 @@ class Stopping(unittest.TestCase):
             told = follower.answer()
         return told
 
+    def test_a_stop_gets_through_whatever_is_held_up(self):
+        """stderr, a follower, a recording and the host's port are full and nobody reads them: a stop passes by all of them, and at
+        any time of a move. (How soon is for virtual time to say: tests/guard.)"""
+        with emu.directory() as where:
+            fifo = os.path.join(where, "line.rec")
+            os.mkfifo(fifo)
+            reader, writer = os.pipe()
+            with guarded("mpc", rig(guard.MPC), guard_args=("--record", fifo), stderr=writer) as (_, g, port), Channel(
+                    g.socket) as deaf:
+                os.close(writer)
+                deaf.order("follow")
+                for _ in range(2000):
+                    port.send(b"\xee" * 64)
+                guard.pause(0.1) # for the parser: it waits for 50 ms of silence
+                for i in range(10):
+                    g.arm()
+                    self.moving(g, port)
+                    guard.pause(0.013 * i)
+                    port.send(b"C" * 50) # they come to nothing while it moves
+                    if i % 2 == 0:
+                        port.send(b"\x03")
+                    else:
+                        g.order("stop")
+                        g.wait_for("stopped")
+                        self.assertEqual(g.order("clear")["ok"], True)
+                        g.arm()
+                    g.wait_for("armed")
+                    self.assertEqual(port.receive(2, 0.05), b"\r" if i % 2 == 0 else b"")
+                self.at_rest(port)
+            os.close(reader)
+
     def test_followers_are_not_told_of_queries(self):
         with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, port), Channel(g.socket) as follower:
             follower.order("follow")

@@ -252,6 +252,27 @@ class Killed(unittest.TestCase):
         self.assertEqual(guard.run("log", self.guard.log)[0], 0)
         self.guard.arm()
 
+    def test_the_guard_in_a_move_that_cannot_be_stopped(self):
+        """^C does not stop H of a TRIO [T note 12]: it ends at its target, and the next guard waits for that."""
+        with emu.directory() as directory, emu.Emulator("trio") as e:
+            with Guard(directory, e.path, rig(guard.TRIO)) as g, emu.Port(g.path) as port:
+                g.arm()
+                port.send(b"H" + emu.point(100000, 10667, 10667)) # 8.4 mm along X
+                g.wait_for("moving-unstoppable")
+                emu.wait_until(lambda: not g.status()["within_frame"], "the frame to leave")
+                guard.pause(0.1)
+                g.kill()
+                g.start()
+                with emu.Port(g.path) as again:
+                    self.assertEqual(again.ask(b"C", 14)[:12], emu.point(100000, 10667, 10667))
+                self.assertEqual((g.status()["state"], g.status()["fault"]), ("disarmed", "none"))
+                self.assertIn("the last guard was not stopped in order", self.last_start(g))
+
+    @staticmethod
+    def last_start(g):
+        with open(g.log, encoding="utf-8") as file:
+            return [line for line in file if " start " in line][-1]
+
     def test_the_guard_within_a_frame(self):
         """The controller waits for the rest of the frame, and a person has to switch it off and on."""
         self.guard.arm()
