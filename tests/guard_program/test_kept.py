@@ -159,6 +159,27 @@ class Replaying(unittest.TestCase):
             self.assertEqual(guard.run("log", g.log, "--config", g.config, "--record", path)[0], 0)
             self.assertRegex(read(path), r" > 4D 03 00 00 00 00 00 00 00 00 00 00 00\n[^<]* mpc > 43\n")
 
+    def test_what_did_not_leave_is_not_told(self):
+        with guarded("mpc", rig(guard.MPC, more="knob_um_per_s = 20000;").replace("knobs_locked = true; ", "")) as (_, g, port):
+            port.send(line(0, 2000, 0, 0))
+            g.wait_for("moving")
+            g.order("stop")
+            g.wait_for("stopped")
+            g.order("clear")
+            g.arm()
+            self.assertEqual(port.ask(line(15, 10, 0, 0), 1), b"\r")
+            g.stop()
+            path = g.log + ".rec"
+            self.assertEqual(guard.run("log", g.log, "--config", g.config, "--record", path)[0], 0)
+            text = read(path)
+            with open(g.log, encoding="utf-8") as file:
+                moved = sum("checking to moving" in row for row in file)
+            self.assertEqual((text.count(" mpc > 53 "), moved), (2, 2))
+            self.assertRegex(text, r" mpc > 53 00\n[^>]* mpc > 00 7D 00 00 ") # the guard's pause is in it
+            self.assertRegex(text, r" mpc > 03\n(.* mpc - .*\n)* *[0-9.]+ [0-9.]+ mpc < 0D\n")
+            for what, wanted in (("decode", "DRYRIG"), ("replay", "DRYRIG_EMU")):
+                self.assertIn(run(wanted, what, path)[0], (0, 1)) # where the stop left it is a matter of microseconds
+
     def test_what_cannot_be_told(self):
         with guarded("mpc", rig(guard.MPC)) as (_, g, _):
             g.stop()

@@ -10,6 +10,8 @@
 #include <string.h>
 
 #define QUERY_BITS (15u * 10u) /* a position query and its answer */
+#define BEFORE_PAUSE 2u        /* bytes of an MPC-200's 'S' that leave before the guard's pause */
+#define PAUSE_US 35000u
 #define US_PER_S 1000000u
 
 typedef struct {
@@ -19,6 +21,8 @@ typedef struct {
     unsigned told, others;        /* starts */
     uint64_t now_us, last_us;     /* of the present record; of the last line */
     dr_us when;                   /* of the last record */
+    dr_record motion;             /* that was allowed and has not left yet */
+    bool waits;                   /* there is one */
     bool moves;                   /* a motion has left, and its end is not told yet */
     bool good;                    /* everything could be written */
 } teller;
@@ -44,6 +48,25 @@ static void put_words(teller *t, const dr_record *record)
     if (t->now_us > t->last_us)
         t->last_us = t->now_us;
     t->good = dr_recording_event(t->to, t->last_us, t->last_us, t->name, text) && t->good;
+}
+
+static bool is_motion(const teller *t, const dr_record *record)
+{
+    dr_command command;
+    return dr_command_find((dr_kind)t->r->limits.kind, t->r->limits.firmware, record->bytes[0], &command) &&
+           (command.is & DR_IS_MOTION) != 0;
+}
+
+/* The motion that waited leaves now. */
+static void put_motion(teller *t)
+{
+    const dr_record *const m = &t->motion;
+    const size_t first = m->op == DR_OP_MPC_LINE ? BEFORE_PAUSE : m->count;
+    t->waits = false;
+    t->moves = true;
+    put(t, DR_RECORDING_FROM_HOST, t->now_us, m->bytes, first);
+    if (first < m->count)
+        put(t, DR_RECORDING_FROM_HOST, t->now_us + PAUSE_US, m->bytes + first, m->count - first);
 }
 
 static dr_command position_query(const teller *t)
@@ -80,7 +103,7 @@ static void begin(teller *t, const dr_record *record)
     const dr_limits *const l = &t->r->limits;
     const char *const kind = dr_words_kind((dr_kind)l->kind);
     t->when = record->when;
-    t->moves = false;
+    t->waits = t->moves = false;
     t->name[0] = '\0';
     if (record->position_steps[0] != dr_limits_crc(l)) {
         t->others++;
@@ -100,15 +123,20 @@ static void begin(teller *t, const dr_record *record)
 static void tell(teller *t, const dr_record *record, const dr_record *next)
 {
     static const uint8_t cr = DR_CR, interrupt = DR_INTERRUPT;
-    dr_command command;
     switch (record->event) {
     case DR_EVENT_ALLOWED:
-        put_kept(t, DR_RECORDING_FROM_HOST, record);
-        t->moves = dr_command_find((dr_kind)t->r->limits.kind, t->r->limits.firmware, record->bytes[0], &command) &&
-                   (command.is & DR_IS_MOTION) != 0;
+        t->waits = is_motion(t, record);
+        t->motion = *record;
+        if (!t->waits)
+            put_kept(t, DR_RECORDING_FROM_HOST, record);
+        break;
+    case DR_EVENT_STATE:
+        if (t->waits && (record->after == DR_GUARD_MOVING_S || record->after == DR_GUARD_MOVING_U))
+            put_motion(t);
+        put_words(t, record);
         break;
     case DR_EVENT_STOP:
-        t->moves = false;
+        t->waits = t->moves = false;
         put(t, DR_RECORDING_FROM_HOST, t->now_us, &interrupt, 1);
         break;
     case DR_EVENT_REPLY:

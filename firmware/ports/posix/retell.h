@@ -1,8 +1,8 @@
 /* retell: a guard's log as a recording (dr_recording.h) of the controller's line, for `dryrig-emu replay`.
  *
- * The log has what the line carried but for its times: the guard's own queries are known by their answers, the end of a
- * motion by its CR; a frame stands where it was allowed, which is 2 ms before it left (37 before the rest of an MPC-200's
- * 'S'). Streamed positions are not in it, and no more than 16 bytes of what nobody asked for.
+ * The log has what the line carried: the guard's own queries are known by their answers, the end of a motion by its CR; a
+ * motion's frame left when the state became "moving", and one that was withdrawn is not told. Streamed positions are not in
+ * the log, and no more than 16 bytes of what nobody asked for.
  * Thread-safety: none needed. */
 #ifndef RETELL_H
 #define RETELL_H
