@@ -110,10 +110,11 @@ static uint16_t any_facts(chance *c)
 {
     static const uint16_t trio[] = {0, DR_RIG_Y_LOCKED_OUT, DR_RIG_PATHS_UNKNOWN,
                                     DR_RIG_Y_LOCKED_OUT | DR_RIG_PATHS_UNKNOWN};
-    static const uint16_t mpc[] = {0, DR_RIG_HOME_IS_ZERO, DR_RIG_MAY_STREAM,
-                                   DR_RIG_HOME_IS_ZERO | DR_RIG_MAY_STREAM | DR_RIG_PATHS_UNKNOWN};
-    const uint16_t knobs = one_in(c, 4) ? 0 : DR_RIG_KNOBS_LOCKED;
-    return (uint16_t)(knobs | (rig.limits.kind == DR_TRIO ? trio[any_below(c, 4)] : mpc[any_below(c, 4)]));
+    static const uint16_t mpc[] = {0, DR_RIG_HOME_IS_ZERO, DR_RIG_MAY_STREAM | DR_RIG_Y_LOCKED_OUT << 1,
+                                   DR_RIG_HOME_IS_ZERO | DR_RIG_MAY_STREAM | DR_RIG_PATHS_UNKNOWN |
+                                       DR_RIG_Y_LOCKED_OUT};
+    const uint16_t knobs = one_in(c, 4) ? 0 : DR_RIG_KNOBS_LOCKED, stays = one_in(c, 4) ? DR_RIG_STAYS_ARMED : 0;
+    return (uint16_t)(knobs | stays | (rig.limits.kind == DR_TRIO ? trio[any_below(c, 4)] : mpc[any_below(c, 4)]));
 }
 
 /* A byte of the controller's: 1 in 16 changes or gets lost. */
@@ -144,7 +145,7 @@ void hostile_begin(chance *c, bool lies)
     rig.limits.mode_min = (uint8_t)any_below(c, 10);
     for (uint8_t drive = 0; drive < rig.controller.drive_count; drive++) {
         any_drive(c, drive, is_trio ? trio[any_below(c, 4)] : mpc[any_below(c, 6)]);
-        rig.drives[drive].y_moves_home = (rig.limits.rig & DR_RIG_Y_LOCKED_OUT) == 0;
+        rig.drives[drive].y_moves_home = (rig.limits.rig & DR_RIG_Y_LOCKED_OUT << drive) == 0;
         for (uint32_t i = any_below(c, 6); i > 0; i--)
             any_obstacle(c, drive);
     }
