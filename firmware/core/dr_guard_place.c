@@ -115,6 +115,7 @@ bool dr_g_is_at(const dr_guard *g, const dr_reply *reply, const dr_box *target_q
 
 void dr_g_start_proof(dr_guard *g, dr_us now)
 {
+    g->proved = g->ambiguous = false;
     g->task = TASK_PROVE;
     g->attempts = PROVE_ATTEMPTS;
     dr_g_set_timer(g, DR_TIMER_TASK, now + READY_US);

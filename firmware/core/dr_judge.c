@@ -228,8 +228,8 @@ static bool line_hits(const dr_segment *line, const dr_obstacle *o, int32_t marg
 
 static bool path_hits(const dr_path *path, const dr_obstacle *o, int32_t margin_q)
 {
-    if (path->straight)
-        return line_hits(&path->line, o, margin_q);
+    if (path->straight) /* its hull first: most obstacles are nowhere near, and 8 bits are slow with the line's products */
+        return box_hits(&path->swept[0], o, margin_q) && line_hits(&path->line, o, margin_q);
     for (uint8_t stage = 0; stage < path->stages; stage++)
         if (box_hits(&path->swept[stage], o, margin_q))
             return true;

@@ -1028,6 +1028,37 @@ static void a_motion_that_has_not_begun_does_not_begin_without_its_host(void)
     expect_tip(0, 40000, 40000, 40000);
 }
 
+/* A person confirms what has been read, not what is about to be. */
+static void a_proof_under_way_is_not_confirmed(void)
+{
+    static const uint8_t zero[14] = {1, 0, 0, 0, 0, 0, 0,
+                                     0, 0, 0, 0, 0, 0, 0x0D}; /* a TRIO at 0 degrees, or an MPC-200 */
+    bench_trio();
+    rig.by_hand = true;
+    bench_start();
+    run_ms(1001);
+    device_says(zero, 14);
+    TEST_ASSERT_TRUE(status().confirm_wanted);
+    stop_input(true);
+    run_ms(20);
+    device_says("\r", 1);
+    run_ms(101);
+    device_says(zero, 14);
+    run_ms(101);
+    device_says(zero, 14); /* at rest: the proof begins anew */
+    expect_state(DR_GUARD_LOCKED);
+    stop_input(false);
+    run_ms(30);
+    press(DR_INPUT_CONFIRM);
+    expect_state(DR_GUARD_LOCKED);
+    input(DR_INPUT_STOP, true); /* one contact: a fault of the wiring in a while */
+    run_ms(20);
+    device_says("\r", 1);
+    run_ms(100);
+    expect_fault(DR_FAULT_STOP_WIRING);
+    TEST_ASSERT_TRUE(status().state == DR_GUARD_LOCKED || status().state == DR_GUARD_STOPPING);
+}
+
 /* A program that is suspended between the reading and the motion: a knob may have gone anywhere. */
 static void row_59_a_reading_that_is_too_old_is_taken_again(void)
 {
@@ -1102,6 +1133,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(who_asks_for_the_hosts_bytes_settles_what_is_due);
     RUN_TEST(what_is_put_aside_is_logged_before_what_follows);
+    RUN_TEST(a_proof_under_way_is_not_confirmed);
     RUN_TEST(half_a_setting_is_not_overwritten);
     RUN_TEST(damage_in_the_pause_within_s_finishes_the_frame_and_stops);
     RUN_TEST(power_that_comes_back_finds_nothing_on_its_way);
