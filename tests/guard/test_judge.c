@@ -667,13 +667,7 @@ static void the_frame_alone_is_held_against_the_longest_travel(void)
 {
     static const uint32_t travel[DR_AXES] = {533333, 133333, 266667}; /* an MP-865 [T] */
     dr_command command;
-    limits.drives[0].stage = DR_STAGE_NONE;
     TEST_ASSERT_TRUE(dr_command_find(DR_TRIO, limits.firmware, 'S', &command));
-    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
-        dr_request request = {command.op, 0, {0, 0, 0}};
-        request.steps[axis] = 1; /* nothing is connected: no travel at all */
-        tells(DR_REASON_RANGE, axis, DR_NO_ITEM, 1, 0, dr_judge_frame(&limits, &command, &request));
-    }
     TEST_ASSERT_TRUE(dr_limits_init_drive(&limits, 0, DR_STAGE_TRIO_MP865));
     for (uint8_t axis = 0; axis < DR_AXES; axis++) {
         dr_request request = {command.op, 0, {0, 0, 0}};
@@ -682,6 +676,10 @@ static void the_frame_alone_is_held_against_the_longest_travel(void)
         request.steps[axis]++;
         tells(DR_REASON_RANGE, axis, DR_NO_ITEM, travel[axis] + 1, travel[axis],
               dr_judge_frame(&limits, &command, &request));
+        limits.drives[0].stage = DR_STAGE_NONE; /* nothing is connected: no travel at all */
+        request.steps[axis] = 1;
+        tells(DR_REASON_RANGE, axis, DR_NO_ITEM, 1, 0, dr_judge_frame(&limits, &command, &request));
+        limits.drives[0].stage = DR_STAGE_TRIO_MP865;
     }
     rig(DR_MPC);
     at(5000, 5000, 5000);
@@ -877,6 +875,17 @@ static void a_move_in_stages_keeps_to_no_slanting_line(void)
     }
 }
 
+static void a_move_in_stages_may_be_as_far_off_the_line_as_one_that_is_straight(void)
+{
+    surface(1000);
+    scene.in_tissue = true;
+    ALLOWED(judge('S', 5002, 5000, 5100));
+    ALLOWED(judge('H', 5002, 5000, 5100));
+    ALLOWED(judge('W', 5000, 5002, 5100));
+    REFUSED(DR_REASON_APPROACH, verdict_of('H', 0, 5002 * 8 + 1, 40000, 5100 * 8).reason);
+    REFUSED(DR_REASON_APPROACH, verdict_of('W', 0, 40000, 5002 * 8 + 1, 5100 * 8).reason);
+}
+
 static void every_move_that_was_broken_off_must_be_clear(void)
 {
     static const dr_box high = {{UM(5000), UM(5000), UM(9000)}, {UM(5000), UM(5000), UM(9000)}};
@@ -955,6 +964,7 @@ int main(void)
     RUN_TEST(both_stages_of_home_and_work_order_are_held_against_the_surface);
     RUN_TEST(the_cap_of_an_mpc_holds_with_the_faster_of_two_tables);
     RUN_TEST(a_move_in_stages_keeps_to_no_slanting_line);
+    RUN_TEST(a_move_in_stages_may_be_as_far_off_the_line_as_one_that_is_straight);
     RUN_TEST(every_move_that_was_broken_off_must_be_clear);
     RUN_TEST(one_degree_is_no_angle_at_which_an_axis_fails);
     RUN_TEST(in_tissue_without_a_surface_nothing_moves_and_says_so);
