@@ -119,17 +119,6 @@ class Telling(unittest.TestCase):
             self.assertEqual(hashes[0], hashes[1])
             self.assertNotEqual(hashes[0], hashes[2])
 
-    def test_the_manuals_example_is_right(self):
-        manual = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "guard.md")
-        with open(manual, encoding="utf-8") as file, emu.directory() as directory:
-            words = file.read()
-            conf = config_file(directory, words.split("```")[1])
-            status, out, err = guard.run("check", conf)
-            self.assertEqual((status, err), (0, ""))
-            self.assertIn("TRIO MP-245A", out)
-            command = words.split("dryrig-guard explain rig.conf ")[1].splitlines()[0]
-            self.assertEqual(guard.run("explain", conf, *shlex.split(command))[0], 0)
-
     def test_explain(self):
         with emu.directory() as directory:
             conf = config_file(directory, rig(guard.MPC, keepouts=guard.POST, high=20000))

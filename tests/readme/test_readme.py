@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 ROOT, BUILD, COMPILER, *FLAGS = sys.argv[1:]
@@ -45,12 +46,34 @@ class Readme(unittest.TestCase):
         return re.sub(r"(?<![\w/])build/", f"{BUILD}/", text)
 
     def run_here(self, *command):
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=self.directory.name)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=self.directory.name,
+                              env={**os.environ, "PATH": f"{BUILD}/firmware/ports/posix:{os.environ['PATH']}"})
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         return done.stdout
 
     def test_commands(self):
         self.run_here("sh", "-ec", self.here("\n".join(blocks("sh"))))
+
+    def test_guard(self):
+        told = [line.split() for line in re.findall(r"^    (dryrig-guard .*)$", README, re.MULTILINE)]
+        self.assertEqual(len(told), 2)
+        self.run_here("sh", "-ec", blocks("sh")[-1].split("dryrig-guard")[0])  # rig.conf
+        run, order = ([self.here(word).replace("/dev/ttyUSB0", self.path("mpc")).replace("/tmp/rig", self.path("rig"))
+                       for word in words[1:]] for words in told)
+        guard = subprocess.Popen([f"{BUILD}/firmware/ports/posix/dryrig-guard", *run], cwd=self.directory.name,
+                                 stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        self.addCleanup(self.stop, guard)
+        self.assertRegex(guard.stdout.readline(), r"^ready /dev/pts/\d+\n$")
+        self.run_here(f"{BUILD}/firmware/ports/posix/dryrig-guard", "ctl", self.path("rig.sock"), "status")
+        for _ in range(200):  # it proves first who the controller is
+            if '"needs":[{"need":"key"' in self.run_here(f"{BUILD}/firmware/ports/posix/dryrig-guard", "ctl", "--json",
+                                                         self.path("rig.sock"), "status"):
+                break
+            time.sleep(0.05)
+        self.run_here(f"{BUILD}/firmware/ports/posix/dryrig-guard", *order)
+        out = self.run_here(f"{BUILD}/host/dryrig", "--port", self.path("rig"), "--controller", "mpc", "--stage", "MP-225", "line",
+                            "100", "200", "300", "--speed", "15")
+        self.assertEqual(out, "x 100.000  y 200.000  z 300.000 um  drive 1\n")
 
     def test_python(self):
         for program in blocks("python"):
@@ -73,8 +96,9 @@ class Words(unittest.TestCase):
 
     def test_options_exist(self):
         programs = [f"{BUILD}/emulator/dryrig-emu", f"{BUILD}/host/dryrig"]
-        programs.append(f"{BUILD}/emulator/dryrig-panel")
+        programs += [f"{BUILD}/emulator/dryrig-panel", f"{BUILD}/firmware/ports/posix/dryrig-guard"]
         known = "".join(subprocess.run([p, "--help"], capture_output=True, text=True, check=True).stdout for p in programs)
+        known += subprocess.run([programs[-1], "explain", "--help"], capture_output=True, text=True, check=True).stdout
         others = {"--build", "--install", "--cflags", "--libs"}  # of CMake and pkg-config
         for option in set(re.findall(r"(?<![\w-])--[a-z]+", README)) - others:
             self.assertRegex(known, rf"{option}\b")
