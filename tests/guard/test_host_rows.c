@@ -141,7 +141,7 @@ static void row_21_one_bit_flipped_stays_within_the_policies(void)
         else
             moved++;
     }
-    /* 112 flips: published in docs/guard.md. The monitors hold for all. */
+    /* 112 flips; more of them: test_flips.c. The monitors hold for all. */
     TEST_ASSERT_EQUAL(112, refused + moved + other);
     TEST_ASSERT_LESS_THAN(45, moved);
     TEST_ASSERT_GREATER_THAN(60, refused);
