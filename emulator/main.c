@@ -15,6 +15,7 @@
 #include "playback.h" /* the controller's side of a recording, for a host */
 #include "record.h"   /* the bytes of the line, kept */
 #include "replay.h"   /* and played again */
+#include "replay_port.h"
 #include "script.h"   /* scenarios */
 #include "terminal.h" /* leaving it as it was */
 #include "trace.h"    /* what happens, in words */
@@ -612,7 +613,7 @@ int main(int argc, char **argv)
     o = options_read(argc, argv);
     p.o = &o;
     if (o.task == TASK_REPLAY)
-        return replay(o.replay);
+        return o.replay_port == NULL ? replay(o.replay) : replay_port(o.replay, o.replay_port, o.may_move);
     if (o.task == TASK_PLAYBACK)
         return playback(&(playback_options){o.replay, o.playback_link, o.speedup, o.clock != CLOCK_REAL});
     return run(&p);

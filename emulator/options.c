@@ -62,7 +62,9 @@ enum {
     LINT_JUNIT,
     STRICT,
     RECORD,
-    TO_HOST
+    TO_HOST,
+    PORT,
+    MAY_MOVE
 };
 
 static const struct argp_option known[] = {
@@ -124,6 +126,9 @@ static const struct argp_option known[] = {
     {"rig", RIG_FILE, "FILE", 0, "With run: the controllers of a rig file", 5},
     {"to-host", TO_HOST, NULL, 0,
      "With replay: play the controller's side of FILE to a host; --link, --clock real|jump and --speedup apply", 5},
+    {"port", PORT, "PATH", 0,
+     "With replay: play the host's side of FILE to what is at PATH, a real controller or another; see --may-move", 5},
+    {"may-move", MAY_MOVE, NULL, 0, "With replay --port: it may move the stage of what is there", 5},
     {NULL, 'h', NULL, OPTION_HIDDEN, NULL, -1},
     {NULL, 0, NULL, 0, NULL, 0}};
 
@@ -224,6 +229,12 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case TO_HOST:
         t->to_host = true;
         break;
+    case PORT:
+        once(state, &t->o->replay_port, "port", value);
+        break;
+    case MAY_MOVE:
+        t->o->may_move = true;
+        break;
     case 'h':
         argp_state_help(state, stdout, ARGP_HELP_STD_HELP);
         break;
@@ -259,6 +270,9 @@ static void read_task(options *o, typed *t)
     if (strcmp(first, "replay") == 0) {
         if (t->word_count != 2)
             refuse("replay: one recording, please: dryrig-emu replay FILE");
+        if (o->replay_port == NULL ? o->may_move : t->to_host)
+            refuse("--port PATH plays the host's side to what is there; --may-move is for it, --to-host is the other "
+                   "side");
         o->replay = t->words[1];
         o->task = t->to_host ? TASK_PLAYBACK : TASK_REPLAY;
         o->playback_link = t->link;
@@ -266,6 +280,8 @@ static void read_task(options *o, typed *t)
     }
     if (t->to_host)
         refuse("--to-host is for replay: dryrig-emu replay --to-host FILE");
+    if (o->replay_port != NULL || o->may_move)
+        refuse("--port and --may-move are for replay: dryrig-emu replay FILE --port PATH --may-move");
     if (strcmp(first, "rig") == 0) {
         at = t->word_count > 1 && strcmp(t->words[1], "check") == 0 ? 2 : 1;
         o->task = at == 2 ? TASK_CHECK : TASK_EMULATE;
@@ -372,7 +388,7 @@ options options_read(int argc, char **argv)
         known,
         parse,
         "trio|mpc\nrun trio|mpc -- COMMAND [ARGUMENT...]\nrun --rig FILE -- COMMAND [ARGUMENT...]\nrig [check] FILE\n"
-        "replay FILE\nreplay --to-host FILE\n"
+        "replay FILE\nreplay FILE --port PATH --may-move\nreplay --to-host FILE\n"
         "ctl PATH COMMAND",
         "Stands in for a Sutter TRIO MP-245A (trio) or MPC-200 (mpc) micromanipulator controller on a pseudo-terminal. "
         "Prints 'ready' and the port's path, and runs until SIGINT, SIGTERM or SIGHUP.\n"

@@ -28,6 +28,7 @@ typedef struct {
     const char *lint_json, *lint_junit; /* files for the same; NULL: none */
     const char *record;                 /* where the bytes of the line go; NULL: nowhere */
     const char *replay;                 /* TASK_REPLAY, TASK_PLAYBACK: the recording */
+    const char *replay_port;            /* TASK_REPLAY: what it is played to; NULL: the described controllers */
     const char *playback_link;          /* TASK_PLAYBACK: the port's stable name; NULL: none */
     const char *control;                /* NULL: none */
     const char *scenario;               /* a file of what is done; NULL: none */
@@ -37,6 +38,7 @@ typedef struct {
     bool waits_for_client;
     bool lints;          /* tells at the end which rules the host has broken */
     bool is_strict;      /* TASK_RUN: findings turn the command's exit status 0 into 3 */
+    bool may_move;       /* TASK_REPLAY at a port */
     bool seed_is_chosen; /* by the program */
 } options;
 
