@@ -149,7 +149,8 @@ class Stream(unittest.TestCase):
             self.assertGreaterEqual(len(frames), 769_231 * 128_000 // 120 // 1_000_000 * 98 // 100)
         # 16 steps a um at 1,300 um/s: when each position was reached, against when its frame began to leave.
         late = [us - x * 1_000_000 / (16 * 1300) for us, x in frames]
-        self.assertLessEqual(max(late) - min(late), frame_us + (1000 if IS_USB else 0))
+        # USB: a packet a millisecond, which the simulated computer fetches within an eighth of one.
+        self.assertLessEqual(max(late) - min(late), frame_us + (1125 if IS_USB else 0))
 
     def test_at_a_slow_speed_every_micron_is_told(self):
         # 10.7 kB/s; from 12 on a line of 125000 baud is too slow. USB has jitter, and the last frame must not find the

@@ -30,18 +30,23 @@ CONFIGURATION = {
         external_switch5_on = true; external_switch6_on = false; %(more)s
         drives = ({ number = 1; device = "MP-845"; microstep_um = 0.09375; max_move_um = 5000;
                     box_um = { x = (100, 24900); y = (100, 24900); z = (100, 20000); }; });
-        keepouts = ({ name = "objective"; drive = 1; box_um = { x = (9000, 16000); y = (9000, 16000); z = (0, 12000); }; });""",
+        keepouts = (%(keepouts)s);""",
     "mpc": """format = 1; revision = %(revision)d; profile = "mpc-200"; firmware = "3.21"; %(more)s
         drives = ({ number = 1; device = "MP-225"; microstep_um = 0.0625; switch8_on = true; max_move_um = 5000;
                     box_um = { x = (100, 24900); y = (100, 24900); z = (100, 20000); }; });
-        keepouts = ({ name = "objective"; drive = 1; box_um = { x = (9000, 16000); y = (9000, 16000); z = (0, 12000); }; });""",
+        keepouts = (%(keepouts)s);""",
 }
+FLOOR = '{ name = "o%d"; drive = 1; half = { normal = (1, %d, -1000); through_um = (0, 0, %d); }; }'
+OBJECTIVE = '{ name = "o%d"; drive = 1; box_um = { x = (9000, 16000); y = (9000, 16000); z = (%d, %d); }; }'
 
 
-def compiled(controller="trio", revision=7, more=""):
+
+def compiled(controller="trio", revision=7, more="", boxes=1, floors=0):
+    keepouts = ",".join([OBJECTIVE % (i, 12000 * i // boxes, 12000 * (i + 1) // boxes - 100) for i in range(boxes)] +
+                        [FLOOR % (boxes + i, i, 19500 - i) for i in range(floors)])
     with tempfile.TemporaryDirectory() as temporary:
         text, image = Path(temporary, "rig.conf"), Path(temporary, "rig.bin")
-        text.write_text(CONFIGURATION[controller] % {"revision": revision, "more": more})
+        text.write_text(CONFIGURATION[controller] % {"revision": revision, "more": more, "keepouts": keepouts})
         subprocess.run([GUARD, "compile", text, "-o", image], check=True, stdout=subprocess.PIPE)
         return image.read_bytes()
 
@@ -143,6 +148,15 @@ class Talk(unittest.TestCase):
         self.assertEqual(got.controller_got(ARMED), b"ccc")
         self.assertEqual(got.host_got(), HERE + b"\x1e\r")
         self.assertEqual(len(got.records(EVENT_REFUSED)), 2)
+
+    def test_obstacles_are_judged_in_time_and_too_many_refuse(self):
+        move = line(15, 20256, 20003, 20013)
+        for boxes, floors, tip in ((32, 0, move[2:]), (1, 8, move[2:]), (1, 31, HERE)):
+            with self.subTest(boxes=boxes, floors=floors):
+                got = run([*TO_ARM, (ARMED, move), (ARMED + 1_400_000, "stop")], eeprom(compiled(boxes=boxes, floors=floors)))
+                self.assertEqual(got.tip, tip)
+                self.assertEqual(len(got.records(EVENT_REFUSED)), 0 if tip != HERE else 1)
+                self.assertEqual(len(got.records(EVENT_START)), 1)
 
     def test_a_flood_of_nonsense_moves_nothing_and_wakes_no_watchdog(self):
         noise = bytes((i * 73 + 11) % 251 for i in range(2000))
