@@ -286,7 +286,8 @@ static uint16_t times_that_fit(const dr_controller *c, uint8_t times)
 static void lose_power(faults *f, uint64_t now_us, const dr_controller *c, fault_id id)
 {
     fault_rule r;
-    if (!strikes(f, id, now_us, c->move_op, &r))
+    const bool began_by_itself = c->move_op == DR_OP_TRIO_RECALIBRATE && !c->move_answers; /* or it would never end */
+    if (began_by_itself || !strikes(f, id, now_us, c->move_op, &r))
         return;
     f->power_off_us = now_us + dr_leg_lasts_us(&c->leg) / 2u;
     f->without_power_us = r.delay_us;

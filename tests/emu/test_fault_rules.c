@@ -523,6 +523,18 @@ static void a_trio_calibrates_when_the_power_is_back(void)
     check_sent("", 0);
 }
 
+static void the_calibration_at_power_on_keeps_its_power(void)
+{
+    switch_on(DR_TRIO, 1);
+    fault_rule *const rule = rule_of(FAULT_POWER_LOSS);
+    rule->left = FAULT_ALWAYS;
+    add(rule);
+    say_move('H', 100000, 0, 0);
+    run_out();
+    TEST_ASSERT_EQUAL(DR_STATE_REST, ins.controller.state);
+    check_at(10667, 10667, 10667);
+}
+
 static void somebody_may_be_faster_with_the_mains_switch(void)
 {
     add(rule_of(FAULT_POWER_LOSS));
@@ -617,6 +629,7 @@ int main(void)
     RUN_TEST(the_power_goes_in_the_middle_of_a_move_and_comes_back);
     RUN_TEST(the_power_takes_the_positions_with_it);
     RUN_TEST(a_trio_calibrates_when_the_power_is_back);
+    RUN_TEST(the_calibration_at_power_on_keeps_its_power);
     RUN_TEST(somebody_may_be_faster_with_the_mains_switch);
     RUN_TEST(a_power_loss_that_is_taken_back_does_not_come);
     RUN_TEST(the_same_seed_gives_the_same_bytes_at_the_same_instants);
