@@ -20,8 +20,8 @@ const dr_controller *dr_emulator_controller(void);
 
 /* All of dr_emulator_begin() but the power switch. */
 dr_controller *dr_emulator_prepare(void);
-/* dr_emulator_step() at this instant; where `has_end` says so, the wait ends at `until` at the latest. */
-void dr_emulator_loop(dr_us now, bool has_end, dr_us until);
+/* dr_emulator_step() at this instant, which waits for no longer than that; 0: as long as there is nothing to do. */
+void dr_emulator_step_at(dr_us now, dr_us longest_us);
 /* Something that is kept without power may have changed. */
 void dr_emulator_touch(dr_us now);
 

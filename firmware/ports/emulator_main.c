@@ -99,30 +99,26 @@ static void sooner(bool also, dr_us other, bool *has_end, dr_us *until)
     *has_end = *has_end || also;
 }
 
-void dr_emulator_loop(dr_us now, bool has_end, dr_us until)
+void dr_emulator_step_at(dr_us now, dr_us longest_us)
 {
-    dr_us other;
+    dr_us until = now, other;
     if (dr_controller_ready(&controller) == 0) {
         line_at = now;
         line_at_ns = 0;
     }
     hear(now);
-    const bool tells = tell(now, &other);
-    sooner(tells, other, &has_end, &until);
+    bool has_end = tell(now, &until);
     const bool keeps = dr_keep_step(&keep, &controller, now, &other);
     if (!dr_port_waits())
         return;
     sooner(keeps, other, &has_end, &until);
     const bool moves = dr_controller_due(&controller, &other);
     sooner(moves, other, &has_end, &until);
+    sooner(longest_us > 0, now + longest_us, &has_end, &until);
     dr_port_wait(has_end, until);
 }
 
-void dr_emulator_step(void)
-{
-    const dr_us now = dr_port_now_us();
-    dr_emulator_loop(now, false, now);
-}
+void dr_emulator_step(void) { dr_emulator_step_at(dr_port_now_us(), 0); }
 
 void dr_emulator_touch(dr_us now) { dr_keep_touch(&keep, now); }
 
@@ -150,5 +146,6 @@ dr_controller *dr_emulator_prepare(void)
 void dr_emulator_begin(void)
 {
     const dr_hand power_on = {.what = DR_HAND_POWER_ON};
-    (void)dr_controller_poke(dr_emulator_prepare(), heard, &power_on);
+    dr_controller *const c = dr_emulator_prepare();
+    (void)dr_controller_poke(c, heard, &power_on);
 }

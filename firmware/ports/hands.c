@@ -108,5 +108,5 @@ void dr_hands_step(void)
         has_due = dr_panel_due(&panel, &due);
         dr_emulator_touch(now);
     }
-    dr_emulator_loop(now, true, looked + DR_LOOK_US);
+    dr_emulator_step_at(now, looked + DR_LOOK_US - now);
 }

@@ -62,9 +62,9 @@ class Pico(unittest.TestCase):
     def test_stream_and_interrupt(self):
         begin = READY_US + 80_000
         sent = run("mpc", [(READY_US, b"O"), (READY_US + 10_000, b"S"), (READY_US + 40_000, b"\x03"), (begin, point(3200, 0, 0)),
-                           (begin + 40_000, b"\x03"), (begin + 60_000, "stop")])
+                           (begin + 41_500, b"\x03"), (begin + 60_000, "stop")])
         data = between(sent, begin, begin + 60_000)
-        count = (len(data) - 1) // 12  # 325 um/s: 13 whole microns in 40 ms
+        count = (len(data) - 1) // 12  # 325 um/s: 13.5 microns in 41.5 ms
         self.assertEqual((count, data[-1:], len(data)), (13, b"\r", 13 * 12 + 1))
         for k in range(count):
             x = (16 * (k + 1)).to_bytes(3, "little")

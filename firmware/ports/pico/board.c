@@ -20,14 +20,6 @@ static const uint8_t output_pins[] = {26, 25}; /* GP26, and the LED */
 uint8_t dr_port_begin(void)
 {
     uint8_t straps = 0;
-    for (uint8_t pin = FIRST_INPUT; pin < FIRST_INPUT + DR_PORT_INPUTS; pin++) {
-        gpio_init(pin);
-        gpio_pull_up(pin);
-    }
-    for (uint8_t i = 0; i < sizeof output_pins; i++) {
-        gpio_init(output_pins[i]);
-        gpio_set_dir(output_pins[i], GPIO_OUT);
-    }
     for (uint8_t i = 0; i < sizeof strap_pins; i++) {
         gpio_init(strap_pins[i]);
         gpio_pull_up(strap_pins[i]);
@@ -86,12 +78,26 @@ bool dr_port_has_pace(void) { return false; }
 
 /* -- Inputs and outputs -------------------------------------------------------------------------------------------- */
 
-uint16_t dr_port_inputs(void) { return (uint16_t)(~gpio_get_all() >> FIRST_INPUT); }
+uint16_t dr_port_inputs(void)
+{
+    static bool are_ready;
+    for (uint8_t pin = FIRST_INPUT; !are_ready && pin < FIRST_INPUT + DR_PORT_INPUTS; pin++) {
+        gpio_init(pin);
+        gpio_pull_up(pin);
+    }
+    if (!are_ready)
+        busy_wait_us(100);
+    are_ready = true;
+    return (uint16_t)(~gpio_get_all() >> FIRST_INPUT);
+}
 
 void dr_port_outputs(uint8_t high)
 {
-    for (uint8_t i = 0; i < sizeof output_pins; i++)
+    for (uint8_t i = 0; i < sizeof output_pins; i++) {
+        gpio_init(output_pins[i]);
+        gpio_set_dir(output_pins[i], GPIO_OUT);
         gpio_put(output_pins[i], (high >> i & 1u) != 0);
+    }
 }
 
 /* -- Memory: the last two sectors of the flash, a page for each slot ------------------------------------------------- */
