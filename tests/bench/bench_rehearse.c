@@ -1,7 +1,8 @@
 /* What rehearsing costs: 64 controllers in one process, beside one process that does nothing but read a byte from each of 64
- * pseudo-terminals and write 14 back; and moves through the whole travel with --clock jump, beside moves of no length.
+ * pseudo-terminals and write 14 back; moves through the whole travel with --clock jump, beside moves of no length; and `run`,
+ * beside a shell that runs the same command: from its end to theirs, and all in all.
  *
- *     bench_rehearse EMULATOR [ROUNDS [MOVES]]
+ *     bench_rehearse EMULATOR [ROUNDS [MOVES [RUNS]]]
  *
  * Prints a table; passes no judgement. What is compared is run in turns, so that a noisy machine disturbs both alike. */
 #define _GNU_SOURCE /* posix_openpt, cfmakeraw, mkdtemp */
@@ -247,13 +248,84 @@ static void long_moves(char *emulator, unsigned moves)
     stop(&s, 1);
 }
 
+/* -- run ------------------------------------------------------------------------------------------------------------------ */
+
+#define STAMP "--stamp" /* this program as the command: it tells the time and ends */
+
+static int stamp(void)
+{
+    const double at_s = now_s();
+    return fwrite(&at_s, sizeof at_s, 1, stdout) == 1 && fflush(stdout) == 0 ? 0 : 1;
+}
+
+static int compare(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* How long it ran, and how much of that after its command's end. */
+static void time_one(char **command, double *whole_s, double *behind_s)
+{
+    int out[2];
+    double at_s = 0;
+    if (pipe(out) != 0)
+        give_up("pipe");
+    const double began_s = now_s();
+    const pid_t pid = fork_child();
+    if (pid == 0) {
+        (void)dup2(out[1], STDOUT_FILENO);
+        (void)close(out[0]);
+        (void)close(out[1]);
+        (void)execv(command[0], command);
+        _exit(127);
+    }
+    (void)close(out[1]);
+    (void)waitpid(pid, NULL, 0);
+    const double ended_s = now_s();
+    if (read(out[0], &at_s, sizeof at_s) != (ssize_t)sizeof at_s)
+        give_up(command[0]);
+    (void)close(out[0]);
+    *whole_s = ended_s - began_s;
+    *behind_s = ended_s - at_s;
+}
+
+static void ends(char *emulator, char *self, unsigned runs)
+{
+    char *by_shell[] = {(char[]){"/bin/sh"}, (char[]){"-c"}, (char[]){"\"$0\" " STAMP "; exit $?"}, self, NULL};
+    char *by_run[] = {emulator, (char[]){"run"}, (char[]){"mpc"}, (char[]){"--"}, self, (char[]){STAMP}, NULL};
+    double *const times = calloc(4u * (size_t)runs, sizeof *times);
+    if (times == NULL)
+        give_up("memory");
+    double *const shell = times, *const shell_behind = shell + runs, *const run = shell_behind + runs,
+                  *const run_behind = run + runs;
+    for (unsigned i = 0; i < runs; i++) {
+        time_one(by_shell, &shell[i], &shell_behind[i]);
+        time_one(by_run, &run[i], &run_behind[i]);
+    }
+    for (unsigned i = 0; i < 4; i++)
+        qsort(times + (size_t)i * runs, runs, sizeof *times, compare);
+    const unsigned half = runs / 2;
+    (void)printf("\n                                       sh -c        run    ratio\n");
+    (void)printf("a command, all in all       ms  %12.2f %10.2f %8.2f\n", 1e3 * shell[half], 1e3 * run[half],
+                 run[half] / shell[half]);
+    (void)printf("from its end to the end     ms  %12.2f %10.2f %8.2f\n", 1e3 * shell_behind[half],
+                 1e3 * run_behind[half], run_behind[half] / shell_behind[half]);
+    (void)printf("... the slowest of %-4u     ms  %12.2f %10.2f %8.2f\n", runs, 1e3 * shell_behind[runs - 1],
+                 1e3 * run_behind[runs - 1], run_behind[runs - 1] / shell_behind[runs - 1]);
+    free(times);
+}
+
 int main(int argc, char **argv)
 {
+    if (argc == 2 && strcmp(argv[1], STAMP) == 0)
+        return stamp();
     if (argc < 2) {
-        (void)fprintf(stderr, "bench_rehearse EMULATOR [ROUNDS [MOVES]]\n");
+        (void)fprintf(stderr, "bench_rehearse EMULATOR [ROUNDS [MOVES [RUNS]]]\n");
         return 2;
     }
     many_controllers(argv[1], argc > 2 ? (unsigned)strtoul(argv[2], NULL, 10) : 2000);
     long_moves(argv[1], argc > 3 ? (unsigned)strtoul(argv[3], NULL, 10) : 1000);
+    ends(argv[1], argv[0], argc > 4 ? (unsigned)strtoul(argv[4], NULL, 10) : 200);
     return 0;
 }
