@@ -1,10 +1,12 @@
 """Rig files: several controllers in one process, each with its own port; and what is said about wrong files."""
+import json
 import os
 import subprocess
 import sys
 import unittest
 
 import emu
+from ctl import ctl
 from emu import Port, point
 
 CR = b"\r"
@@ -50,6 +52,33 @@ class Rig(unittest.TestCase):
         process.communicate(timeout=emu.LIMIT_S)
         self.assertEqual(process.returncode, 0)
         self.assertFalse(os.path.lexists(self.link))
+
+    def test_a_plug_and_the_power_of_one_are_its_own(self):
+        self.write(RIGHT)
+        control = os.path.join(self.directory, "control")
+        process = emu.start("rig", self.path, "--clock", "step", "--control", control)
+        self.addCleanup(process.kill)
+        paths = dict(word.split("=") for word in process.stdout.readline().decode().split()[1:])
+
+        def do(*words):
+            status, out, error = ctl(control, *words)
+            self.assertEqual((status, error), (0, ""))
+            return json.loads(out)
+
+        def told(who, what):
+            return do("@" + who, "state")["controllers"][0][what]
+        do("@left", "fault", "usb-unplug", "5s", "on", "K")
+        do("@right", "fault", "power-loss", "1s")
+        with Port(self.link) as left, Port(paths["right"]) as right:
+            right.send(b"x" + bytes(4))
+            left.send(b"K")
+            do("advance", "1s")
+            self.assertEqual((told("left", "port"), told("right", "state"), told("mpc", "state")), (None, "off", "rest"))
+            self.assertFalse(os.path.lexists(self.link))
+        self.assertTrue(do("advance", "until", "idle")["idle"])
+        self.assertEqual((os.readlink(self.link), told("right", "state")), (told("left", "port"), "rest"))
+        process.terminate()
+        process.communicate(timeout=emu.LIMIT_S)
 
     def test_run_gives_each_port_a_variable(self):
         self.write(RIGHT)
