@@ -407,9 +407,29 @@ static bool open_script(program *p, const char *path, const char *whose)
     return false;
 }
 
-static void do_line(const program *p, unsigned member, unsigned n, char line[LANGUAGE_LINE])
+#define DO_ROOM (LANGUAGE_LINE + RIG_NAME_MAX) /* one that is too long stays too long */
+
+/* A line of a rig file, for its controller. Returns how many characters are put before it. */
+static unsigned do_line(const program *p, unsigned member, unsigned n, char line[DO_ROOM])
 {
-    (void)snprintf(line, LANGUAGE_LINE, "@%s %s", p->o->rig.members[member].name, p->o->rig.members[member].do_[n]);
+    const rig_member *const m = &p->o->rig.members[member];
+    const bool is_named = m->do_[n][0] == '@';
+    (void)snprintf(line, DO_ROOM, "%s%s%s%s", is_named ? "" : "@", is_named ? "" : m->name, is_named ? "" : " ",
+                   m->do_[n]);
+    return is_named ? 0 : (unsigned)strlen(m->name) + 2u;
+}
+
+static bool check_rig_line(const program *p, language *l, unsigned member, unsigned n)
+{
+    char line[DO_ROOM], why[WHY_ROOM];
+    unsigned column;
+    const unsigned added = do_line(p, member, n, line);
+    const rig_member *const m = &p->o->rig.members[member];
+    if (language_check(l, line, why, &column))
+        return true;
+    (void)fprintf(stderr, "dryrig-emu: %s:%u:%u: %s\n", p->o->rig_file, m->do_line[n],
+                  m->do_column[n] + column - 1u - added, why);
+    return false;
 }
 
 static bool check_line(language *l, const char *line)
@@ -426,14 +446,12 @@ static bool check_line(language *l, const char *line)
 static bool check_first(program *p)
 {
     const rig *const r = &p->o->rig;
-    char line[LANGUAGE_LINE], why[PATH_ROOM + WHY_ROOM];
+    char why[PATH_ROOM + WHY_ROOM];
     language l = {.e = &p->e, .trace = p->o->trace == NULL ? NULL : &p->trace};
     for (unsigned i = 0; i < r->count; i++) {
-        for (unsigned n = 0; n < r->members[i].do_count; n++) {
-            do_line(p, i, n, line);
-            if (!check_line(&l, line))
+        for (unsigned n = 0; n < r->members[i].do_count; n++)
+            if (!check_rig_line(p, &l, i, n))
                 return false;
-        }
         if (!open_script(p, r->members[i].scenario, r->members[i].name))
             return false;
     }
@@ -454,10 +472,10 @@ static bool check_first(program *p)
 static bool do_first(program *p)
 {
     const rig *const r = &p->o->rig;
-    char line[LANGUAGE_LINE], why[PATH_ROOM + WHY_ROOM];
+    char line[DO_ROOM], why[PATH_ROOM + WHY_ROOM];
     for (unsigned i = 0; i < r->count; i++)
         for (unsigned n = 0; n < r->members[i].do_count; n++) {
-            do_line(p, i, n, line);
+            (void)do_line(p, i, n, line);
             if (!desk_do(&p->desk, line))
                 return false;
         }

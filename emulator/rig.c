@@ -65,6 +65,17 @@ static bool read_list(const reading *r, const config_setting_t *from, const char
     return true;
 }
 
+/* Where the lines of `do` stand, for what is found wrong with them later. */
+static bool note_places(const reading *r, const config_setting_t *entry, rig_member *member)
+{
+    const bool is_list = config_setting_is_aggregate(entry) == CONFIG_TRUE;
+    for (unsigned i = 0; strcmp(config_setting_name(entry), "do") == 0 && i < member->do_count; i++) {
+        member->do_line[i] = config_setting_source_line(is_list ? config_setting_get_elem(entry, i) : entry);
+        member->do_column[i] = textfile_column(r->text, member->do_line[i], member->do_[i]);
+    }
+    return true;
+}
+
 static bool read_entry(const reading *r, const config_setting_t *entry, rig_member *member, setup_text *t,
                        const char **name)
 {
@@ -97,7 +108,7 @@ static bool read_entry(const reading *r, const config_setting_t *entry, rig_memb
         }
     for (size_t i = 0; i < sizeof many / sizeof many[0]; i++)
         if (strcmp(key, many[i].key) == 0)
-            return read_list(r, entry, many[i].texts, many[i].most, many[i].count);
+            return read_list(r, entry, many[i].texts, many[i].most, many[i].count) && note_places(r, entry, member);
     return wrong_at(r, entry,
                     "there is no such entry; expected name, controller, link, firmware, devices, positions, works, "
                     "home, angle, quirks, pace, scenario, state or do");

@@ -23,6 +23,7 @@ typedef struct {
     const char *link;            /* NULL: none */
     const char *scenario;        /* a file of what is done; NULL: none */
     const char *do_[RIG_DO_MAX]; /* what is done at the start, in the control channel's language */
+    unsigned do_line[RIG_DO_MAX], do_column[RIG_DO_MAX]; /* where that stands in the file */
     unsigned do_count;
     setup setup;
 } rig_member;

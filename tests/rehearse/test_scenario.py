@@ -173,7 +173,11 @@ class Rig(Files):
         self.assertEqual(emu.outcome("rig", "check", self.rig())[0], 0)
         status, _, error = emu.outcome("rig", "check", self.rig('do = [ "set mode 3" ];'))
         self.assertEqual(status, 2)
-        self.assertIn("@right set mode 3", error)
+        self.assertIn("rig.cfg:3:", error)
+        self.assertIn("a TRIO has no modes", error)
+        rig = self.write('controllers = (\n { controller = "mpc"; do = [ "power off",\n   "set position 1 1,2" ]; } );',
+                         os.path.join(self.directory, "rig2"))
+        self.assertIn(f"{rig}:3:20: '1,2': expected X,Y,Z", emu.outcome("rig", "check", rig)[2])
         status, _, error = emu.outcome("rig", self.rig(), "--scenario", self.write("power off\n", self.path + "2"))
         self.assertEqual(status, 2)
         self.assertIn(":1:1: which controller?", error)
