@@ -3,10 +3,10 @@
 
 #define RAW_STOPS_MAX 15u /* ^C that wait to leave */
 
-/* What does not fit a host that does not read is lost, as on a wire. */
+/* What does not fit a host that does not read is lost, as on a wire; so is what comes when nobody is there. */
 void dr_g_put_host(dr_guard *g, uint8_t byte)
 {
-    if (g->to_host_count < DR_HOST_OUT_MAX)
+    if (g->host_open && g->to_host_count < DR_HOST_OUT_MAX)
         g->to_host[((unsigned)g->to_host_first + g->to_host_count++) % DR_HOST_OUT_MAX] = byte;
 }
 

@@ -1059,6 +1059,27 @@ static void a_proof_under_way_is_not_confirmed(void)
     TEST_ASSERT_TRUE(status().state == DR_GUARD_LOCKED || status().state == DR_GUARD_STOPPING);
 }
 
+/* The answer to a host that has gone is not for the next one, whose first answer it would seem to be. */
+static void what_comes_for_a_host_that_has_gone_is_not_kept(void)
+{
+    for (unsigned stays_armed = 0; stays_armed < 2; stays_armed++) {
+        bench_trio();
+        rig.limits.rig |= stays_armed == 1 ? DR_RIG_STAYS_ARMED : 0;
+        bench_start();
+        bench_arm();
+        host_code('c');
+        run_us(400);
+        cables(false, true);
+        rig.heard_taken = rig.heard_count; /* the first of 14 bytes has come in time */
+        run_ms(10);
+        cables(true, true);
+        expect_silence();
+        host_code('c');
+        run_ms(10);
+        TEST_ASSERT_EQUAL(14, rig.heard_count - rig.heard_taken);
+    }
+}
+
 /* A program that is suspended between the reading and the motion: a knob may have gone anywhere. */
 static void row_59_a_reading_that_is_too_old_is_taken_again(void)
 {
@@ -1134,6 +1155,7 @@ int main(void)
     RUN_TEST(who_asks_for_the_hosts_bytes_settles_what_is_due);
     RUN_TEST(what_is_put_aside_is_logged_before_what_follows);
     RUN_TEST(a_proof_under_way_is_not_confirmed);
+    RUN_TEST(what_comes_for_a_host_that_has_gone_is_not_kept);
     RUN_TEST(half_a_setting_is_not_overwritten);
     RUN_TEST(damage_in_the_pause_within_s_finishes_the_frame_and_stops);
     RUN_TEST(power_that_comes_back_finds_nothing_on_its_way);
