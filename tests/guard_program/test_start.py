@@ -46,6 +46,9 @@ class Failing(unittest.TestCase):
             self.fails(directory, 3, [f"{conf}:3: 'margin' has no unit"], "--port", "/dev/null", "--config", conf)
             self.fails(directory, 3, [f"{conf}:3: 'margin' has no unit"], "check", conf)
             self.fails(directory, 3, ["No such file"], "check", conf + "x")
+            conf = config_file(directory, rig(guard.MPC, more="relay = true;"))
+            self.fails(directory, 3, ["'relay' is for a guard on a board"], "--port", "/dev/null", "--config", conf)
+            self.assertIn("relay: for a guard on a board", guard.run("check", conf)[1])
 
     def test_a_port_that_is_none_or_somebody_elses(self):
         with emu.directory() as directory, emu.Emulator("mpc") as e:

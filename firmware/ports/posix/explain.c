@@ -74,12 +74,12 @@ static void print_drive(FILE *out, const rig *r, uint8_t drive)
     dr_stage stage;
     if (!dr_stage_get((dr_stage_id)d->stage, &stage))
         return;
-    const uint32_t free_points = rig_count_free(l, drive, NULL), points = RIG_GRID * RIG_GRID * RIG_GRID;
+    const uint32_t free_points = rig_count_free(l, drive, RIG_POINTS, NULL);
     (void)fprintf(out, "\ndrive %u: %s, microstep %g um\n  box           ", drive + 1u,
                   dr_words_stage((dr_stage_id)d->stage), (double)stage.quanta_per_step / DR_QUANTA_PER_UM);
     print_box(out, &d->box_q);
     (void)fprintf(out, "\n  room          %.1f %% of the box (the rest is obstacles and their margin)\n",
-                  100.0 * free_points / points);
+                  100.0 * free_points / RIG_POINTS);
     (void)fprintf(out, "  longest move  %s um\n  speed         ", um(a, d->max_move_q));
     print_level(out, l, drive, d->fast_level);
     (void)fprintf(out, "\n");
@@ -153,7 +153,7 @@ static void print_fate(FILE *out, const rig *r, const dr_command *command)
                             command->op != DR_OP_TRIO_WORK && command->op != DR_OP_MPC_HOME &&
                             command->op != DR_OP_MPC_WORK;
     if (verdict.reason == DR_REASON_NONE && is_motion && !is_targeted) {
-        (void)rig_count_free(l, scene.drive, scene.start_steps);
+        (void)rig_count_free(l, scene.drive, 1, scene.start_steps);
         verdict = dr_judge_motion(l, &scene, command, &request);
     }
     (void)fprintf(out, "  %c  %-12s ", command->code, dr_words_command((dr_op)command->op)->name);
@@ -211,6 +211,8 @@ static void print_warnings(FILE *out, const rig *r)
         (void)fprintf(
             out, "  stay_armed: any program that opens the port may move, for %u s after the last motion of another\n",
             l->arm_idle_s);
+    if ((l->rig & DR_RIG_HAS_CUT) != 0 && ++count > 0)
+        (void)fprintf(out, "  relay: for a guard on a board; dryrig-guard itself has none and does not run with it\n");
     if (l->refusal == DR_REFUSE_E && ++count > 0)
         (void)fprintf(out, "  refusal = \"E\": some programs take any byte for the end of a move; see the manual\n");
     if (l->serial[0] == 0 && ++count > 0)

@@ -149,7 +149,13 @@ static int run(int argc, char **argv)
     static bridge b;
     bridge_options o = {NULL, NULL, NULL, NULL, NULL, NULL};
     (void)argp_parse(&argp, argc, argv, 0, NULL, &o);
-    return read_config(&b.rig, o.config) ? bridge_run(&b, &o) : EXIT_CONFIG;
+    if (!read_config(&b.rig, o.config))
+        return EXIT_CONFIG;
+    if ((b.rig.limits.rig & DR_RIG_HAS_CUT) == 0)
+        return bridge_run(&b, &o);
+    (void)fprintf(stderr, "dryrig-guard: %s: 'relay' is for a guard on a board: this program cannot open one\n",
+                  o.config);
+    return EXIT_CONFIG;
 }
 
 /* -- check ------------------------------------------------------------------------------------------------------------- */

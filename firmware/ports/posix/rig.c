@@ -565,6 +565,7 @@ static void read_facts(reader *r, const config_setting_t *root)
     set_fact(l, DR_RIG_PATHS_UNKNOWN, choice(r, root, "path_model", paths, 0) == 1);
     set_fact(l, DR_RIG_MAY_CALIBRATE, flag(r, root, "allow_calibrate", false));
     set_fact(l, DR_RIG_STAYS_ARMED, flag(r, root, "stay_armed", false));
+    set_fact(l, DR_RIG_HAS_CUT, flag(r, root, "relay", false));
 }
 
 static void read_numbers(reader *r, const config_setting_t *root)
@@ -601,8 +602,8 @@ static void read_serial(reader *r, const config_setting_t *root)
 
 #define FOR_ANY                                                                                                        \
     "format", "revision", "profile", "firmware", "converter_serial", "knobs_locked", "path_model", "allow_calibrate",  \
-        "refusal", "on_host_loss", "stay_armed", "unstoppable_ms", "arm_idle_s", "margin_um", "knob_um_per_s",         \
-        "beyond_zero_um", "drives", "keepouts"
+        "refusal", "on_host_loss", "stay_armed", "relay", "unstoppable_ms", "arm_idle_s", "margin_um",                 \
+        "knob_um_per_s", "beyond_zero_um", "drives", "keepouts"
 
 static void read_root(reader *r, const config_setting_t *root)
 {
@@ -703,14 +704,14 @@ uint8_t rig_ports(const dr_limits *l)
     return ports;
 }
 
-uint32_t rig_count_free(const dr_limits *l, uint8_t drive, uint32_t one[DR_AXES])
+uint32_t rig_count_free(const dr_limits *l, uint8_t drive, uint32_t enough, uint32_t one[DR_AXES])
 {
     dr_stage stage;
     uint32_t count = 0;
     const dr_box *const box = &l->drives[drive].box_q;
     if (!dr_stage_get((dr_stage_id)l->drives[drive].stage, &stage))
         return 0;
-    for (uint32_t i = 0; i < RIG_GRID * RIG_GRID * RIG_GRID; i++) {
+    for (uint32_t i = 0; i < RIG_POINTS && count < enough; i++) {
         const uint32_t at[DR_AXES] = {i % RIG_GRID, i / RIG_GRID % RIG_GRID, i / RIG_GRID / RIG_GRID};
         uint32_t steps[DR_AXES];
         for (unsigned axis = 0; axis < DR_AXES; axis++) {
@@ -734,15 +735,19 @@ static void check_whole(reader *r, const config_setting_t *root)
     if (!dr_limits_check(l, &problem))
         tell_problem(r, root, problem);
     for (uint8_t drive = 0; drive < DR_PORTS && !r->failed; drive++)
-        if (l->drives[drive].stage != DR_STAGE_NONE && rig_count_free(l, drive, NULL) == 0)
+        if (l->drives[drive].stage != DR_STAGE_NONE && rig_count_free(l, drive, 1, NULL) == 0)
             tell_problem(r, root, (dr_limits_problem){DR_LIMITS_NO_ROOM, drive, DR_AXES});
 }
 
 static void read_text(reader *r, char *text, size_t size)
 {
     config_t config;
-    if (memchr(text, '\0', size) != NULL)
-        fail_at(r, 0, "holds a byte of value 0: not a text");
+    const char *const zero = memchr(text, '\0', size);
+    unsigned line = 1;
+    for (const char *at = text; zero != NULL && at < zero; at++)
+        line += *at == '\n';
+    if (zero != NULL)
+        fail_at(r, line, "holds a byte of value 0: not a text");
     else
         (void)memcpy(text + size, "\n", 2); /* libconfig wants an end of the last line */
     check_text(r, text);

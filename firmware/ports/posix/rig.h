@@ -11,9 +11,10 @@
 #include "dr_limits.h"
 
 #define RIG_NAME_MAX 32u   /* of an obstacle, the closing 0 included */
-#define RIG_WHY_MAX 512u   /* room for every explanation */
+#define RIG_WHY_MAX 1024u  /* room for every explanation */
 #define RIG_CONE_SLICES 8u /* boxes that stand for a cone; a cylinder takes one */
 #define RIG_GRID 24u       /* points an axis on which room is counted */
+#define RIG_POINTS (RIG_GRID * RIG_GRID * RIG_GRID)
 
 typedef struct {
     dr_limits limits;                           /* good: dr_limits_check() has passed them */
@@ -27,7 +28,8 @@ bool rig_read(rig *out, const char *path, char *why, size_t room);
 /* Ports up to the last that has a drive. */
 uint8_t rig_ports(const dr_limits *limits);
 
-/* At how many points of a grid of RIG_GRID^3 in a drive's box a tip may stand. one: where one of them is; NULL: never mind. */
-uint32_t rig_count_free(const dr_limits *limits, uint8_t drive, uint32_t one[DR_AXES]);
+/* At how many of RIG_POINTS points of a grid in a drive's box a tip may stand; it stops counting at `enough`. one: where the
+ * last of them is; NULL: never mind. */
+uint32_t rig_count_free(const dr_limits *limits, uint8_t drive, uint32_t enough, uint32_t one[DR_AXES]);
 
 #endif
