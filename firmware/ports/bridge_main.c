@@ -13,7 +13,6 @@
 
 #define STOPS (1u << DR_INPUT_STOP | 1u << DR_INPUT_STOP_2)
 #define PRESSES (1u << DR_INPUT_ARM | 1u << DR_INPUT_TIP_CHANGED | 1u << DR_INPUT_CONFIRM)
-#define HOST_IS_OPEN (1u << 9)
 enum { BUZZER = 1u << 0, LAMP = 1u << 1, RELAY = 1u << 2 };
 
 #define ALIVE UINT32_C(0xA1E57A11) /* no pattern that memory has by itself */
@@ -33,6 +32,7 @@ static struct {
     dr_us looked;
     uint16_t told;  /* the guard, of the inputs that are on */
     bool confirmed; /* since the start */
+    bool host_is_open;
 
     dr_us shown;
     uint8_t steady; /* outputs */
@@ -112,8 +112,10 @@ static void look_at_inputs(dr_us now)
     for (uint8_t input = 0; input <= DR_INPUT_CONFIRM && changed != 0; input++)
         if ((changed >> input & 1u) != 0)
             dr_guard_input(&b.guard, now, (dr_input)input, (on >> input & 1u) != 0);
-    if ((changed & HOST_IS_OPEN) != 0)
-        dr_guard_link(&b.guard, now, (on & HOST_IS_OPEN) != 0, b.has_limits);
+    const bool is_open = dr_port_host_is_open();
+    if (is_open != b.host_is_open)
+        dr_guard_link(&b.guard, now, is_open, b.has_limits);
+    b.host_is_open = is_open;
     b.confirmed = b.confirmed || (changed & on & 1u << DR_INPUT_CONFIRM) != 0;
 }
 

@@ -11,7 +11,6 @@
  *     6        escape: arm with the tip in a forbidden place
  *     7        the tip was changed (press)
  *     8        CONFIRM (press)
- *     9        the host has its port open: DTR of its converter (low when open); to ground where nothing can tell
  *
  *     output   high
  *     0        buzzer: a stop was asked for and something may still move
@@ -52,6 +51,10 @@ size_t dr_port_line_room(dr_line line);
 void dr_port_line_write(dr_line line, const uint8_t *bytes, size_t count);
 /* Has everything left, the last stop bit too? */
 bool dr_port_line_is_sent(dr_line line);
+
+/* Has a program opened the host's port? DTR: of USB, or of the converter on an input pin, low when open (9 on boards that have
+ * the inputs above); to ground where nothing can tell. */
+bool dr_port_host_is_open(void);
 
 /* -- Configuration: what `dryrig-guard compile` writes, twice -------------------------------------------------------- */
 

@@ -85,6 +85,8 @@ void dr_port_line_write(dr_line line, const uint8_t *bytes, size_t count)
 
 bool dr_port_line_is_sent(dr_line line) { return line != DR_LINE_DEVICE || !device_sends; }
 
+bool dr_port_host_is_open(void) { return (inputs & HOST) != 0; }
+
 void dr_port_configuration(uint8_t which, uint8_t *image, size_t size)
 {
     TEST_ASSERT_EQUAL(DR_LIMITS_IMAGE_BYTES, size);

@@ -109,6 +109,8 @@ bool dr_port_line_is_sent(dr_line which)
     return !l->has_sent || (l->left == l->given && (UART(which)->status & _BV(TXC0)) != 0);
 }
 
+bool dr_port_host_is_open(void) { return (PINF & _BV(PF3)) == 0; } /* A3, one of the inputs: it has its pull-up */
+
 /* -- Configuration: the EEPROM, each in its half -------------------------------------------------------------------- */
 
 void dr_port_configuration(uint8_t which, uint8_t *image, size_t size)

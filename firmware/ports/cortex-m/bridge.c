@@ -37,6 +37,8 @@ bool dr_port_line_is_sent(dr_line line)
     return uart_room((uint8_t)line) > 0 && dr_port_now_us() - written[line] > 2u * byte_us[line];
 }
 
+bool dr_port_host_is_open(void) { return (dr_port_inputs() >> 9 & 1u) != 0; }
+
 /* -- Configuration ------------------------------------------------------------------------------------------------- */
 
 #define CONFIGURATIONS 0x00380000u

@@ -38,7 +38,7 @@ const uint16_t *tud_descriptor_string_cb(uint8_t index, uint16_t language)
 {
     static uint16_t descriptor[32];
     static char serial_number[2 * PICO_UNIQUE_BOARD_ID_SIZE_BYTES + 1];
-    static const char *const strings[STRINGS] = {"\x09\x04", "Dryrig", "Dryrig controller emulator", serial_number};
+    static const char *const strings[STRINGS] = {"\x09\x04", "Dryrig", USB_PRODUCT, serial_number};
     uint8_t count = 0;
     (void)language;
     if (index >= STRINGS)

@@ -5,6 +5,8 @@
 //
 // Script and output are those of avr_board: "US HEX...", "US low GP...", "US open GP...", "US stop"; "US HEX" for each byte, in
 // the board's own time.
+// A board that is a bridge: prints "US >HEX" for each byte on UART 0, to the controller, and "US #HEX..." for a line of the log on
+// UART 1; "US device HEX..." is what a controller says. --limits FILE is its configuration.
 // --memory FILE keeps the last two sectors of the flash there; --straps N closes these straps (bit 0: GP2). RP2040JS is
 // the directory of that package.
 import fs from 'node:fs';
@@ -42,6 +44,9 @@ mcu.flash.set(fs.readFileSync(imageFile), 0);
 const memory = option('--memory');
 if (memory && fs.existsSync(memory))
     mcu.flash.set(fs.readFileSync(memory), KEPT);
+const limits = option('--limits');
+if (limits)
+    mcu.flash.set(fs.readFileSync(limits), KEPT);
 mcu.bootrom.set(bootRom());
 mcu.onBreak = code => {
     const [at, second, third] = mcu.core.registers;
@@ -73,6 +78,14 @@ function runUntil(us) {
 }
 const save = () => { if (memory) fs.writeFileSync(memory, mcu.flash.subarray(KEPT, FLASH)); };
 
+let logLine = '';
+mcu.uart[0].onByte = byte => console.log(`${micros()} >${byte.toString(16).padStart(2, '0')}`);
+mcu.uart[1].onByte = byte => {
+    if (byte === 10)
+        console.log(`${micros()} ${logLine}`);
+    logLine = byte === 10 ? '' : logLine + String.fromCharCode(byte);
+};
+
 if (rest.includes('--script')) {
     cdc.onSerialData = bytes => bytes.forEach(b => console.log(`${micros()} ${b.toString(16).padStart(2, '0')}`));
     for (const line of fs.readFileSync(0, 'utf8').split('\n')) {
@@ -80,14 +93,18 @@ if (rest.includes('--script')) {
         if (!/^\d+$/.test(us))
             continue;
         runUntil(Number(us));
-        if (!connected)
-            fail(`USB is not connected at ${us} us`);
         if (what[0] === 'stop' || what[0] === 'off') {
             save();
             process.exit(0);
         }
         if (what[0] === 'low' || what[0] === 'open') {
             what.slice(1).forEach(pin => mcu.gpio[Number(pin)].setInputValue(what[0] === 'open'));
+            continue;
+        }
+        if (!connected)
+            fail(`USB is not connected at ${us} us`);
+        if (what[0] === 'device') {
+            what.slice(1).forEach(byte => mcu.uart[0].feedByte(parseInt(byte, 16)));
             continue;
         }
         what.forEach(byte => cdc.sendSerialByte(parseInt(byte, 16)));
