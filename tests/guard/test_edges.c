@@ -504,6 +504,25 @@ static void a_drive_that_may_not_be_moved_can_be_active(void)
     expect_tip(1, 81000, 80000, 80000);
 }
 
+/* Nobody knows the stage of a drive that may not be moved: it may be as far out as the longest of the others, and 500 um. */
+static void where_a_drive_that_may_not_be_moved_can_be(void)
+{
+    for (uint8_t longest = 0; longest < 2; longest++)
+        for (uint32_t beyond = 0; beyond < 2; beyond++) {
+            bench_mpc();
+            TEST_ASSERT_TRUE(
+                dr_limits_init_drive(&rig.limits, (uint8_t)(1u - longest), DR_STAGE_MPC_MT800)); /* 22 mm */
+            rig.by_hand = true;
+            bench_start();
+            run_ms(1001);
+            const uint32_t x = 25500 * 16 + beyond;
+            const uint8_t reply[14] = {3, (uint8_t)x, (uint8_t)(x >> 8), (uint8_t)(x >> 16), 0, 1, 0, 0, 0, 1, 0, 0,
+                                       0, 0x0D};
+            device_says(reply, 14);
+            expect_state(beyond == 0 ? DR_GUARD_DISARMED : DR_GUARD_LOCKED);
+        }
+}
+
 static void what_a_reply_to_i_and_k_must_be(void)
 {
     bench_armed_mpc();
@@ -1189,6 +1208,7 @@ int main(void)
     RUN_TEST(noise_after_the_fault_changes_nothing);
     RUN_TEST(a_trio_at_0_degrees_is_told_by_its_axes);
     RUN_TEST(a_drive_that_may_not_be_moved_can_be_active);
+    RUN_TEST(where_a_drive_that_may_not_be_moved_can_be);
     RUN_TEST(what_a_reply_to_i_and_k_must_be);
     RUN_TEST(old_firmware_has_shorter_replies);
     RUN_TEST(the_centre_of_old_firmware_with_leave);
