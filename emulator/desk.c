@@ -103,17 +103,6 @@ bool desk_open(desk *d, engine *e, trace *t, const char *path, char *why, size_t
     return true;
 }
 
-bool desk_do(desk *d, const char *line)
-{
-    cJSON *const object = language_do(&d->language, line, NULL);
-    const char *const error = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, "why"));
-    const bool done = error == NULL;
-    if (!done)
-        (void)fprintf(stderr, "dryrig-emu: '%s': %s\n", line, error);
-    cJSON_Delete(object);
-    return done;
-}
-
 void desk_close(desk *d)
 {
     if (d->links == NULL)

@@ -1,5 +1,5 @@
-/* desk: where the emulator is told what to do while it runs: the control channel (a Unix socket), --do and rig files, all in
- * one language; and those who subscribe to what happens.
+/* desk: where the emulator is told what to do while it runs: the control channel (a Unix socket); and those who subscribe
+ * to what happens.
  *
  * Thread-safety: one thread. */
 #ifndef DESK_H
@@ -19,8 +19,6 @@ typedef struct {
 
 /* path NULL: no socket. False: why[] says what is in the way; nothing was changed. */
 bool desk_open(desk *d, engine *e, trace *t, const char *path, char *why, size_t room);
-/* One line, at the start. False: it cannot be done, and stderr says why. */
-bool desk_do(desk *d, const char *line);
 void desk_close(desk *d);
 
 /* `dryrig-emu ctl PATH WORD...`: sends the words as one line and prints the answer, or the error on stderr. Returns an exit

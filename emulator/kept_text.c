@@ -220,7 +220,7 @@ static bool read_root(const reading *r, const config_setting_t *root, kept_state
 {
     static const uint32_t angle_most[1] = {DR_ANGLE_MAX_DEG};
     const config_setting_t *const version = config_setting_get_member(root, "dryrig_state");
-    uint32_t angle_deg[1];
+    uint32_t angle_deg[1] = {0};
     dr_stage stage;
     if (version == NULL || config_setting_type(version) != CONFIG_TYPE_INT)
         return wrong(r, 1, NULL, "this is no state of a controller: dryrig_state = %d; is missing. It stays as it is",

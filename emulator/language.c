@@ -394,6 +394,17 @@ cJSON *language_do(language *l, const char *line, bool *follows)
     return t.answer;
 }
 
+bool language_done(language *l, const char *line, char why[WHY_ROOM])
+{
+    cJSON *const answer = language_do(l, line, NULL);
+    const char *const error = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(answer, "why"));
+    const bool done = error == NULL;
+    if (!done)
+        (void)snprintf(why, WHY_ROOM, "%s", error);
+    cJSON_Delete(answer);
+    return done;
+}
+
 void language_close(language *l)
 {
     verbs_hands_close(l->e);

@@ -49,6 +49,8 @@ struct language {
 
 /* Carries out a line. {"ok":true, ...} or {"ok":false,"why":"..."}; the caller deletes it. *follows may be NULL. */
 cJSON *language_do(language *l, const char *line, bool *follows);
+/* The same, for who only wants to know whether it could be done. False: why[] tells what was expected. */
+bool language_done(language *l, const char *line, char why[WHY_ROOM]);
 /* Could a line be carried out? What the controllers are by then counts for nothing: 'power on' is right while it is on. False:
  * why[] says what was expected, at the character of that number (from 1). */
 bool language_check(language *l, const char *line, char why[WHY_ROOM], unsigned *column);

@@ -9,6 +9,7 @@
 #include "child.h"  /* the command of `run` */
 #include "desk.h"   /* what it is told while it runs */
 #include "engine.h" /* the loop */
+#include "first.h"  /* what is done at the start */
 #include "lint.h"   /* which rules the host breaks */
 #include "lint_report.h"
 #include "options.h"  /* what was asked for */
@@ -16,7 +17,6 @@
 #include "record.h"   /* the bytes of the line, kept */
 #include "replay.h"   /* and played again */
 #include "replay_port.h"
-#include "script.h"   /* scenarios */
 #include "terminal.h" /* leaving it as it was */
 #include "trace.h"    /* what happens, in words */
 
@@ -44,8 +44,7 @@ typedef struct {
     observer_link *trace_links;
     desk desk;
     kept_file *kept; /* one for each station */
-    script *scripts; /* scenarios, in the order in which they are done */
-    unsigned script_count;
+    first first;     /* what is done at the start */
     lint lint;
     observer_link *lint_links;
     FILE *lint_json, *lint_junit;
@@ -261,10 +260,9 @@ static bool set_up(program *p)
     p->trace_links = calloc(o->rig.count, sizeof *p->trace_links);
     p->lint_links = calloc(o->rig.count, sizeof *p->lint_links);
     p->record_links = calloc(o->rig.count, sizeof *p->record_links);
-    p->scripts = calloc(o->rig.count + 1u, sizeof *p->scripts);
     p->kept = calloc(o->rig.count, sizeof *p->kept);
     if (e->stations == NULL || p->trace_links == NULL || p->lint_links == NULL || p->record_links == NULL ||
-        p->scripts == NULL || p->kept == NULL)
+        p->kept == NULL)
         return false;
     for (unsigned i = 0; i < e->station_count; i++) {
         station *const s = &e->stations[i];
@@ -394,109 +392,6 @@ static void close_kept(program *p)
     free(p->kept);
 }
 
-/* -- What is done at the start ------------------------------------------------------------------------------------------- */
-
-static bool open_script(program *p, const char *path, const char *whose)
-{
-    char why[PATH_ROOM + 256];
-    if (path == NULL || script_open(&p->scripts[p->script_count], path, whose, why, sizeof why)) {
-        p->script_count += path != NULL;
-        return true;
-    }
-    (void)fprintf(stderr, "dryrig-emu: %s\n", why);
-    return false;
-}
-
-#define DO_ROOM (LANGUAGE_LINE + RIG_NAME_MAX) /* one that is too long stays too long */
-
-/* A line of a rig file, for its controller. Returns how many characters are put before it. */
-static unsigned do_line(const program *p, unsigned member, unsigned n, char line[DO_ROOM])
-{
-    const rig_member *const m = &p->o->rig.members[member];
-    const bool is_named = m->do_[n][0] == '@';
-    (void)snprintf(line, DO_ROOM, "%s%s%s%s", is_named ? "" : "@", is_named ? "" : m->name, is_named ? "" : " ",
-                   m->do_[n]);
-    return is_named ? 0 : (unsigned)strlen(m->name) + 2u;
-}
-
-static bool check_rig_line(const program *p, language *l, unsigned member, unsigned n)
-{
-    char line[DO_ROOM], why[WHY_ROOM];
-    unsigned column;
-    const unsigned added = do_line(p, member, n, line);
-    const rig_member *const m = &p->o->rig.members[member];
-    if (language_check(l, line, why, &column))
-        return true;
-    (void)fprintf(stderr, "dryrig-emu: %s:%u:%u: %s\n", p->o->rig_file, m->do_line[n],
-                  m->do_column[n] + column - 1u - added, why);
-    return false;
-}
-
-static bool check_line(language *l, const char *line)
-{
-    char why[WHY_ROOM];
-    unsigned column;
-    if (language_check(l, line, why, &column))
-        return true;
-    (void)fprintf(stderr, "dryrig-emu: '%s': %s\n", line, why);
-    return false;
-}
-
-/* Reads the scenarios, and looks whether what they and the other lines say can be done. */
-static bool check_first(program *p)
-{
-    const rig *const r = &p->o->rig;
-    char why[PATH_ROOM + WHY_ROOM];
-    language l = {.e = &p->e, .trace = p->o->trace == NULL ? NULL : &p->trace};
-    for (unsigned i = 0; i < r->count; i++) {
-        for (unsigned n = 0; n < r->members[i].do_count; n++)
-            if (!check_rig_line(p, &l, i, n))
-                return false;
-        if (!open_script(p, r->members[i].scenario, r->members[i].name))
-            return false;
-    }
-    if (!open_script(p, p->o->scenario, NULL))
-        return false;
-    for (unsigned i = 0; i < p->script_count; i++)
-        if (!script_check(&p->scripts[i], &l, why, sizeof why)) {
-            (void)fprintf(stderr, "dryrig-emu: %s\n", why);
-            return false;
-        }
-    for (unsigned i = 0; i < p->o->do_count; i++)
-        if (!check_line(&l, p->o->dos[i]))
-            return false;
-    return true;
-}
-
-/* What stands in the rig file, then the scenarios, then --do. */
-static bool do_first(program *p)
-{
-    const rig *const r = &p->o->rig;
-    char line[DO_ROOM], why[PATH_ROOM + WHY_ROOM];
-    for (unsigned i = 0; i < r->count; i++)
-        for (unsigned n = 0; n < r->members[i].do_count; n++) {
-            (void)do_line(p, i, n, line);
-            if (!desk_do(&p->desk, line))
-                return false;
-        }
-    for (unsigned i = 0; i < p->script_count; i++)
-        if (!script_do(&p->scripts[i], &p->desk.language, why, sizeof why)) {
-            (void)fprintf(stderr, "dryrig-emu: %s\n", why);
-            return false;
-        }
-    for (unsigned i = 0; i < p->o->do_count; i++)
-        if (!desk_do(&p->desk, p->o->dos[i]))
-            return false;
-    return true;
-}
-
-static void close_scripts(program *p)
-{
-    while (p->script_count > 0)
-        script_close(&p->scripts[--p->script_count]);
-    free(p->scripts);
-}
-
 /* -- The command ---------------------------------------------------------------------------------------------------------- */
 
 /* The panel is beside this program, or wherever programs are. */
@@ -552,7 +447,7 @@ static void start_and_run(program *p)
     engine_start(&p->e);
     for (unsigned i = 0; i < p->e.station_count; i++)
         setup_started(&p->o->rig.members[i].setup, &p->e.stations[i].ins);
-    if (!do_first(p)) {
+    if (!first_do(&p->first, &p->desk.language)) {
         p->status = 2;
         return;
     }
@@ -583,7 +478,8 @@ static int run(program *p)
     char why[PATH_ROOM + 256];
     if (!set_up(p))
         return fail("no memory");
-    if (!check_first(p))
+    language reader = {.e = &p->e, .trace = p->o->trace == NULL ? NULL : &p->trace};
+    if (!first_check(&p->first, p->o, &reader))
         return 2;
     if (p->o->task == TASK_CHECK) {
         const unsigned count = p->o->rig.count;
@@ -611,7 +507,7 @@ static int run(program *p)
         (void)fprintf(stderr, "dryrig-emu: %s\n", why);
         p->status = 1;
     }
-    close_scripts(p);
+    first_close(&p->first);
     if (p->directory[0] != '\0')
         (void)rmdir(p->directory);
     return p->status;

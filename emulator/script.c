@@ -40,17 +40,6 @@ static bool prepare(const script *s, const char *from, size_t length, char line[
     return true;
 }
 
-static bool is_done(language *l, const char *line, char why[WHY_ROOM])
-{
-    cJSON *const answer = language_do(l, line, NULL);
-    const char *const error = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(answer, "why"));
-    const bool done = error == NULL;
-    if (!done)
-        (void)snprintf(why, WHY_ROOM, "%s", error);
-    cJSON_Delete(answer);
-    return done;
-}
-
 static bool each_line(const script *s, language *l, bool is_check, char *why, size_t room)
 {
     unsigned number = 1;
@@ -65,7 +54,7 @@ static bool each_line(const script *s, language *l, bool is_check, char *why, si
             done = language_check(l, line, wrong, &column);
         else if (line[0] != '\0') {
             column = added + 1u + (unsigned)strspn(at, " \t\r");
-            done = is_done(l, line, wrong);
+            done = language_done(l, line, wrong);
         }
         if (!done) {
             (void)snprintf(why, room, "%s:%u:%u: %s", s->path, number, column - added, wrong);
