@@ -23,9 +23,7 @@ int8_t dr_encoder_look(dr_encoder *e, bool a, bool b)
     if (way == 1u)
         e->quarters++;
     else if (way == 3u)
-        e->quarters--;
-    else if (way == 2u) /* a look was missed: it goes on as it went */
-        e->quarters = (int8_t)(e->quarters + (e->quarters > 0 ? 2 : e->quarters < 0 ? -2 : 0));
+        e->quarters--; /* 2: a look was missed, and it may have gone either way */
     if (at != 0)
         return 0;
     const int8_t quarters = e->quarters;

@@ -174,6 +174,7 @@ static void test_each_button_of_an_mpc_is_the_panels(void)
     switch_on(DR_STRAP_OTHER);
     hold_ms(DR_INPUT_DIAGONAL, 50);
     TEST_ASSERT_TRUE(dr_hands_panel()->drives[0].is_diagonal);
+    TEST_ASSERT_EQUAL(2, outputs); /* its LED */
     hold_ms(DR_INPUT_CALIBRATE, 10);
     TEST_ASSERT_EQUAL(DR_OP_MPC_CALIBRATE, controller()->move_op);
     hold_ms(DR_INPUT_STOP, 50);
@@ -186,6 +187,15 @@ static void test_each_button_of_an_mpc_is_the_panels(void)
     TEST_ASSERT_EQUAL(9, controller()->drives[0].mode);
     hold_ms(DR_INPUT_WORK, 2020);
     TEST_ASSERT_TRUE(dr_hands_panel()->drives[0].is_locked);
+}
+
+static void test_manipulator_as_a_button_goes_up(void)
+{
+    switch_on(DR_STRAP_OTHER | DR_STRAP_STAGES); /* four devices */
+    for (unsigned i = 1; i <= 4; i++) {
+        hold_ms(DR_INPUT_MANIPULATOR, 50);
+        TEST_ASSERT_EQUAL(i % 4u, controller()->active);
+    }
 }
 
 static void test_knobs_move_their_axes(void)
@@ -203,7 +213,9 @@ static void test_knobs_move_their_axes(void)
 static void test_what_is_pressed_when_the_power_comes_is_not_pressed(void)
 {
     closed = 1u << DR_INPUT_CALIBRATE | 1u << DR_INPUT_KNOB_X;
-    switch_on(DR_STRAP_OTHER);
+    straps = DR_STRAP_OTHER;
+    dr_hands_begin();
+    run_ms(3 * BOUNCE_MS);
     TEST_ASSERT_EQUAL(DR_STATE_REST, controller()->state);
     TEST_ASSERT_EQUAL(0, at()[DR_X]);
     closed = 0;
@@ -273,6 +285,7 @@ int main(void)
     RUN_TEST(test_who_sleeps_too_long_still_does_things_in_order);
     RUN_TEST(test_each_button_is_the_panels);
     RUN_TEST(test_each_button_of_an_mpc_is_the_panels);
+    RUN_TEST(test_manipulator_as_a_button_goes_up);
     RUN_TEST(test_knobs_move_their_axes);
     RUN_TEST(test_what_is_pressed_when_the_power_comes_is_not_pressed);
     RUN_TEST(test_the_buzzer_sounds_for_a_tenth_of_a_second);
