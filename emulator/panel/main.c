@@ -241,7 +241,7 @@ static void take_key(panel *p, int key)
         p->is_typing = true;
         p->typed[0] = '\0';
     } else if (key == 'n') {
-        p->detents = p->detents == 100 ? 1 : p->detents * 10;
+        p->detents = p->detents == 1000 ? 1 : p->detents * 10;
     } else if (key == 'o') {
         say(p, strcmp(p->m.state, "off") == 0 ? "power on" : "power off");
     } else if (key == '\t') {

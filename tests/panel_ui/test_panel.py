@@ -260,7 +260,9 @@ class Keys(unittest.TestCase):
         with trio() as e, Terminal(PANEL, e.socket_path) as t:
             t.shows("10 detents a key")
             t.keys("n")
-            t.shows("100 detents a key")
+            t.shows(" 100 detents a key")
+            t.keys("n")
+            t.shows("1000 detents a key")
             t.keys("n")
             t.shows("1 detent a key")
             t.keys("Right")
