@@ -100,7 +100,7 @@ typedef struct {
 typedef enum {
     DR_EVENT_START,       /* position[0] = dr_limits_crc, position[1] = revision; code = dr_start */
     DR_EVENT_STATE,       /* the state changed; code = dr_fault */
-    DR_EVENT_ALLOWED,     /* host frame -> controller: bytes; code = 1: again, because it did not leave in time */
+    DR_EVENT_ALLOWED,     /* host frame -> controller: bytes; code = 1: again, the one before did not leave */
     DR_EVENT_REFUSED,     /* host frame refused: bytes, code = dr_reason, axis, item; position = where the tip was */
     DR_EVENT_DROPPED,     /* host bytes that were no frame: the first bytes; code = dr_reason; count = how many */
     DR_EVENT_REPLY,       /* controller -> host, as much as fits: bytes, code = dr_op */
@@ -216,6 +216,7 @@ typedef struct {
     dr_path path; /* of the motion under way */
     uint8_t path_drive;
     bool end_told, small; /* the motion's CR is there; so short that it may never come */
+    bool counted;         /* as a motion that was allowed */
     uint8_t late;         /* how often its reading was too old when it should have left */
     uint8_t tokens;       /* motions that may start now */
     uint8_t noise, quarantined[DR_RECORD_TEXT], quarantined_count;

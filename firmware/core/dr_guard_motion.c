@@ -58,8 +58,10 @@ void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply)
     g->path_drive = g->scene.drive;
     g->small = is_small(g);
     g->end_told = false;
-    g->forwarded++;
-    if (g->late == 0) { /* one token for each motion, however often it is read for */
+    const bool again = g->counted;
+    if (!again) { /* one motion, however often it is read for */
+        g->counted = true;
+        g->forwarded++;
         g->tokens--;
         if (!is_running(g, DR_TIMER_RATE))
             dr_g_set_timer(g, DR_TIMER_RATE, now + RATE_US);
@@ -69,7 +71,7 @@ void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply)
     dr_g_set_timer(g, DR_TIMER_SEND, now + FRAME_GAP_US);
     dr_g_start_idling(g, now);
     g->task = TASK_SEND;
-    dr_g_log_bytes(g, now, DR_EVENT_ALLOWED, g->late > 0, g->command.op, g->frame, length);
+    dr_g_log_bytes(g, now, DR_EVENT_ALLOWED, again, g->command.op, g->frame, length);
 }
 
 /* The margin reckons with what a knob can do from the reading until the motion begins. Who comes later, a suspended program or a
@@ -85,7 +87,6 @@ void dr_g_check_again(dr_guard *g, dr_us now)
 {
     dr_g_withdraw(g);
     dr_g_end_task(g);
-    g->forwarded--;
     if (++g->late > LATE_MAX) {
         dr_g_refuse_pending(g, now, dr_g_because(DR_REASON_NO_POSITION));
         return;

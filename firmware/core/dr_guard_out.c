@@ -51,6 +51,9 @@ void dr_g_refuse(dr_guard *g, dr_us now, const dr_command *command, const uint8_
 
 void dr_g_refuse_pending(dr_guard *g, dr_us now, dr_verdict verdict)
 {
+    if (g->counted)
+        g->forwarded--;
+    g->counted = false;
     dr_g_refuse(g, now, &g->command, g->frame, verdict);
 }
 

@@ -1099,6 +1099,39 @@ static void what_comes_for_a_host_that_has_gone_is_not_kept(void)
     }
 }
 
+/* A motion that is read for twice, because the first answer was a byte too long, is one motion. */
+static void a_motion_that_is_read_for_twice_costs_one_token(void)
+{
+    bench_armed_trio();
+    rig.by_hand = true;
+    rig.guard.tokens = 1;
+    rig.guard.sealed = 0;
+    host_line(15, 40800, 40000, 40000);
+    run_ms(3);
+    says_at(40000, 40000, 40000);
+    device_says("\r", 1);
+    run_ms(103);
+    says_at(40000, 40000, 40000);
+    TEST_ASSERT_EQUAL(2, rig.guard.tokens); /* the one is gone, and two came back in 100 ms */
+    TEST_ASSERT_EQUAL(1, status().forwarded);
+    TEST_ASSERT_EQUAL(1, last_record(DR_EVENT_ALLOWED)->code);
+    run_ms(20);
+    TEST_ASSERT_EQUAL(1, rig.motions);
+
+    bench_armed_trio(); /* and none if nothing believable comes */
+    rig.by_hand = true;
+    host_line(15, 40800, 40000, 40000);
+    run_ms(3);
+    for (int times = 0; times < 2; times++) {
+        says_at(40000, 40000, 40000);
+        device_says("\r", 1);
+        run_ms(103);
+    }
+    expect_fault(DR_FAULT_IMPLAUSIBLE);
+    TEST_ASSERT_EQUAL(0, status().forwarded);
+    TEST_ASSERT_EQUAL(0, rig.motions);
+}
+
 /* A program that is suspended between the reading and the motion: a knob may have gone anywhere. */
 static void row_59_a_reading_that_is_too_old_is_taken_again(void)
 {
@@ -1175,6 +1208,7 @@ int main(void)
     RUN_TEST(what_is_put_aside_is_logged_before_what_follows);
     RUN_TEST(a_proof_under_way_is_not_confirmed);
     RUN_TEST(what_comes_for_a_host_that_has_gone_is_not_kept);
+    RUN_TEST(a_motion_that_is_read_for_twice_costs_one_token);
     RUN_TEST(half_a_setting_is_not_overwritten);
     RUN_TEST(damage_in_the_pause_within_s_finishes_the_frame_and_stops);
     RUN_TEST(power_that_comes_back_finds_nothing_on_its_way);
