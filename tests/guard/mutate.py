@@ -242,7 +242,7 @@ class Bench:
 
     def verdict(self, plan, kind):
         for seconds, program, pick in plan:
-            end, ran, _ = run(self.base / kind / program, [self.at / kind, self.base / kind], 20 * seconds + 0.2, PICK=pick)
+            end, ran, _ = run(self.base / kind / program, [self.at / kind, self.base / kind], 8 * seconds + 0.2, PICK=pick)
             if end != 'well':
                 return end, program
             if ran != pick.count('1'):

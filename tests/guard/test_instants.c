@@ -1,0 +1,364 @@
+/* When exactly: every span that the guard keeps, to the microsecond, told by when it is due. The test is the controller. */
+#include "bench.h"
+
+#include <string.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static dr_us guard_clock(void) { return (dr_us)(rig.clock_at_start + rig.now); }
+
+static void due_in(uint32_t us)
+{
+    dr_us when;
+    TEST_ASSERT_TRUE_MESSAGE(dr_guard_due(&rig.guard, &when), "nothing is due");
+    TEST_ASSERT_EQUAL_UINT32(us, when - guard_clock());
+}
+
+static void says_at(uint32_t x) { device_at(x, 40000, 40000, 30); }
+
+/* A TRIO whose identity is proved; nothing is due but that the place becomes stale, 20 s after the reading. */
+static void proved(void)
+{
+    bench_trio();
+    rig.by_hand = true;
+    bench_start();
+    due_in(1000000);
+    run_us(1000000);
+    says_at(40000);
+    expect_state(DR_GUARD_DISARMED);
+    due_in(20000000);
+}
+
+static void armed(void)
+{
+    proved();
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    due_in(2000);
+    run_us(2000);
+    says_at(40000);
+    due_in(100000);
+    run_us(100000);
+    says_at(40000);
+    expect_state(DR_GUARD_IDLE);
+}
+
+/* Runs until this many bytes have left for the controller. */
+static void run_until_sent(uint32_t count)
+{
+    for (unsigned i = 0; i < 100000 && rig.wire_count < count; i++)
+        run_us(1);
+    TEST_ASSERT_EQUAL(count, rig.wire_count);
+}
+
+/* A line to `x` whose last byte has just left. */
+static void moving_to(uint32_t x, unsigned level)
+{
+    armed();
+    host_line(level, x, 40000, 40000);
+    due_in(2000);
+    run_us(2000);
+    says_at(40000);
+    due_in(2000);
+    const uint32_t before = rig.wire_count;
+    run_us(2000);
+    run_until_sent(before + 14);
+    expect_state(DR_GUARD_MOVING_S);
+}
+
+static void a_silent_controller_is_asked_ten_times_in_pauses_that_grow(void)
+{
+    bench_trio();
+    rig.by_hand = true;
+    bench_start();
+    run_us(1000000);
+    for (uint32_t attempt = 1; attempt <= 10; attempt++) {
+        TEST_ASSERT_EQUAL(attempt, rig.wire_count);
+        due_in(2000000);
+        run_us(2000000);
+        expect_fault(DR_FAULT_DEVICE_SILENT);
+        if (attempt < 10) {
+            due_in(attempt * 1000000);
+            run_us(attempt * 1000000);
+        }
+    }
+    dr_us when;
+    TEST_ASSERT_FALSE(dr_guard_due(&rig.guard, &when));
+}
+
+static void a_reply_may_pause_for_100_ms_and_is_asked_for_again_after_100_ms_of_quiet(void)
+{
+    proved();
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    due_in(2000000);
+    run_us(1999999);
+    device_says("abc", 1);
+    due_in(100000);
+    run_us(99999);
+    device_says("b", 1);
+    due_in(100000);
+    run_us(100000); /* nonsense: too short */
+    due_in(100000);
+    run_us(60000);
+    device_says("c", 1);
+    due_in(100000);
+    const uint32_t before = rig.wire_count;
+    run_us(100000);
+    TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
+    says_at(40000);
+    due_in(100000);
+}
+
+static void a_byte_within_the_gap_before_a_query_begins_it_anew(void)
+{
+    proved();
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(1500);
+    device_says("x", 1);
+    due_in(2000);
+    run_us(2000);
+    says_at(40000);
+    run_us(50000);
+    device_says("x", 1); /* 50 ms before the second reading: that is long enough */
+    due_in(50000);
+    run_us(48500);
+    device_says("x", 1);
+    due_in(2000);
+}
+
+static void a_frame_may_pause_for_100_ms_and_take_300_ms(void)
+{
+    proved();
+    for (unsigned i = 0; i < 3; i++) {
+        host_code('S');
+        due_in(100000);
+        run_us(99999);
+    }
+    due_in(1);
+    host_code('S');
+    due_in(3); /* 300 ms since the first byte */
+    run_us(3);
+    due_in(50000); /* resync: until the host has paused for 50 ms */
+    run_us(49999);
+    TEST_ASSERT_EQUAL(4, status().dropped_bytes);
+    host_code('c');
+    due_in(50000);
+    run_us(50000);
+    host_code('c');
+    TEST_ASSERT_EQUAL(5, status().dropped_bytes);
+    due_in(2000000); /* the query that was passed on must be answered in time */
+    device_says("0123456789ab", 12);
+    due_in(100000);
+}
+
+static void a_motion_has_one_and_a_half_times_its_way_and_2_s(void)
+{
+    moving_to(48000, 15); /* 1,000 um at 5 mm/s: 200 ms */
+    TEST_ASSERT_EQUAL_UINT32(2300000, rig.guard.at[DR_TIMER_TASK] - guard_clock());
+    TEST_ASSERT_EQUAL_UINT32(100000,
+                             rig.guard.at[DR_TIMER_LINE] - guard_clock()); /* so long a cable may tear the frame */
+    run_us(100000);
+    due_in(2200000);
+    run_us(2199999);
+    TEST_ASSERT_EQUAL(0, wire_stops());
+    run_us(1);
+    TEST_ASSERT_EQUAL(1, wire_stops());
+    moving_to(40800, 0); /* 100 um at 1/16 of 5 mm/s: 320 ms */
+    TEST_ASSERT_EQUAL_UINT32(2480000, rig.guard.at[DR_TIMER_TASK] - guard_clock());
+}
+
+static void a_cable_may_tear_a_frame_until_100_ms_behind_it(void)
+{
+    moving_to(48000, 15);
+    run_us(99999);
+    cables(true, false);
+    expect_fault(DR_FAULT_TORN);
+    moving_to(48000, 15);
+    run_us(100000);
+    cables(true, false);
+    expect_fault(DR_FAULT_NO_DEVICE);
+}
+
+static void the_end_is_read_2_ms_behind_its_cr(void)
+{
+    moving_to(48000, 15);
+    run_us(200000);
+    device_says("\r", 1);
+    due_in(2000);
+    run_us(2000);
+    says_at(47000); /* not there: read again, 100 ms later */
+    due_in(100000);
+    run_us(100000);
+    says_at(47000);
+    expect_fault(DR_FAULT_WRONG_END);
+}
+
+static void rest_is_proved_by_two_readings_in_quiet_and_ctrl_c_is_repeated_until_a_cr(void)
+{
+    moving_to(48000, 15);
+    run_us(100000);
+    host_code(3);
+    TEST_ASSERT_EQUAL_UINT32(1000000, rig.guard.at[DR_TIMER_PROOF] - guard_clock());
+    due_in(100000);
+    run_us(100000);
+    due_in(50000); /* quiet, but no CR: ^C goes again at 150 ms, and at 300 ms */
+    run_us(49999);
+    TEST_ASSERT_EQUAL(1, wire_stops());
+    run_us(1);
+    TEST_ASSERT_EQUAL(2, wire_stops());
+    run_us(100000);
+    due_in(50000);
+    run_us(50000);
+    TEST_ASSERT_EQUAL(3, wire_stops());
+    due_in(100000); /* and that was the last */
+    run_us(60000);
+    device_says("x", 1);
+    due_in(100000);
+    run_us(100000);
+    says_at(41000);
+    due_in(100000);
+    run_us(100000);
+    says_at(41000);
+    expect_state(DR_GUARD_IDLE);
+    TEST_ASSERT_EQUAL(3, wire_stops());
+}
+
+static void rest_that_is_not_proved_in_1_s_is_a_fault_and_is_asked_for_every_500_ms(void)
+{
+    moving_to(48000, 15);
+    run_us(100000);
+    host_code(3);
+    device_says("\r", 1);
+    run_us(100000);
+    for (uint32_t i = 0; i < 8; i++) {
+        says_at(41000 + 100 * i);
+        due_in(100000);
+        run_us(100000);
+    }
+    says_at(42000);
+    due_in(100000);
+    run_us(99999);
+    TEST_ASSERT_FALSE(status().buzzer);
+    run_us(1); /* 1 s after ^C */
+    TEST_ASSERT_TRUE(status().buzzer);
+    expect_fault(DR_FAULT_UNSTOPPABLE);
+    says_at(43000);
+    due_in(500000);
+    run_us(500000);
+    says_at(43000);
+    TEST_ASSERT_FALSE(status().buzzer);
+}
+
+static void tokens_for_motions_come_back_every_50_ms(void)
+{
+    armed();
+    rig.guard.tokens = 18; /* as if two motions had just begun */
+    rig.guard.sealed = 0;
+    host_line(15, 48000, 40000, 40000);
+    run_us(2000);
+    says_at(40000);
+    TEST_ASSERT_EQUAL(17, rig.guard.tokens);
+    for (uint8_t tokens = 17; tokens < 20; tokens++) {
+        TEST_ASSERT_EQUAL_UINT32(50000, rig.guard.at[DR_TIMER_RATE] - guard_clock());
+        run_us(49999);
+        TEST_ASSERT_EQUAL(tokens, rig.guard.tokens);
+        run_us(1);
+        TEST_ASSERT_EQUAL(tokens + 1, rig.guard.tokens);
+    }
+    TEST_ASSERT_EQUAL(0, rig.guard.running >> DR_TIMER_RATE & 1);
+}
+
+static void noise_is_counted_by_the_second(void)
+{
+    proved();
+    device_says("0123456789abcdef", 16);
+    due_in(1000000);
+    expect_fault(DR_FAULT_NONE);
+    run_us(999999);
+    expect_state(DR_GUARD_DISARMED);
+    run_us(1);
+    device_says("0123456789abcdef", 16);
+    expect_fault(DR_FAULT_NONE);
+    device_says("g", 1);
+    expect_fault(DR_FAULT_DEVICE_NOISE);
+}
+
+static void stop_contacts_may_disagree_for_50_ms_and_bounce_for_20_ms(void)
+{
+    proved();
+    input(DR_INPUT_STOP, true);
+    run_us(49999);
+    expect_fault(DR_FAULT_NONE);
+    input(DR_INPUT_STOP_2, true);
+    run_us(100000);
+    expect_fault(DR_FAULT_NONE);
+    stop_input(false);
+    input(DR_INPUT_KEY, false);
+    const uint16_t needs = status().needs;
+    TEST_ASSERT_TRUE((needs & DR_NEEDS_STOP_RELEASED) != 0);
+    TEST_ASSERT_EQUAL_UINT32(20000, rig.guard.at[DR_TIMER_RELEASE] - guard_clock());
+    run_us(19999);
+    TEST_ASSERT_TRUE((status().needs & DR_NEEDS_STOP_RELEASED) != 0);
+    run_us(1);
+    TEST_ASSERT_FALSE((status().needs & DR_NEEDS_STOP_RELEASED) != 0);
+    proved();
+    input(DR_INPUT_STOP_2, true);
+    run_us(50000);
+    expect_fault(DR_FAULT_STOP_WIRING);
+    input(DR_INPUT_STOP_2, false); /* a fault of the contacts lets nobody off the 20 ms */
+    TEST_ASSERT_TRUE((status().needs & DR_NEEDS_STOP_RELEASED) != 0);
+    run_us(19999);
+    TEST_ASSERT_TRUE((status().needs & DR_NEEDS_STOP_RELEASED) != 0);
+    run_us(1);
+    TEST_ASSERT_FALSE((status().needs & DR_NEEDS_STOP_RELEASED) != 0);
+}
+
+static void one_call_does_sixteen_things_that_are_due(void)
+{
+    uint8_t byte;
+    bench_trio();
+    rig.by_hand = true;
+    rig.to_device_busy = true; /* nobody pulls: what is due piles up */
+    rig.to_device_at = UINT64_MAX;
+    bench_start();
+    rig.now += 1500000000;
+    (void)dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 0);
+    /* A proof's TASK, READ and READ again are three things an attempt: five attempts, and the sixth's TASK. */
+    TEST_ASSERT_EQUAL(10 - 5, rig.guard.attempts);
+    TEST_ASSERT_TRUE(dr_guard_due(&rig.guard, &(dr_us){0}));
+}
+
+static void a_flipped_bit_among_the_timers_is_no_timer(void)
+{
+    dr_us when;
+    bench_trio();
+    dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64);
+    for (unsigned bit = DR_TIMERS; bit < 16; bit++) {
+        rig.guard.running = (uint16_t)(1u << bit);
+        TEST_ASSERT_FALSE(dr_guard_due(&rig.guard, &when));
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_silent_controller_is_asked_ten_times_in_pauses_that_grow);
+    RUN_TEST(a_reply_may_pause_for_100_ms_and_is_asked_for_again_after_100_ms_of_quiet);
+    RUN_TEST(a_byte_within_the_gap_before_a_query_begins_it_anew);
+    RUN_TEST(a_frame_may_pause_for_100_ms_and_take_300_ms);
+    RUN_TEST(a_motion_has_one_and_a_half_times_its_way_and_2_s);
+    RUN_TEST(a_cable_may_tear_a_frame_until_100_ms_behind_it);
+    RUN_TEST(the_end_is_read_2_ms_behind_its_cr);
+    RUN_TEST(rest_is_proved_by_two_readings_in_quiet_and_ctrl_c_is_repeated_until_a_cr);
+    RUN_TEST(rest_that_is_not_proved_in_1_s_is_a_fault_and_is_asked_for_every_500_ms);
+    RUN_TEST(tokens_for_motions_come_back_every_50_ms);
+    RUN_TEST(noise_is_counted_by_the_second);
+    RUN_TEST(stop_contacts_may_disagree_for_50_ms_and_bounce_for_20_ms);
+    RUN_TEST(one_call_does_sixteen_things_that_are_due);
+    RUN_TEST(a_flipped_bit_among_the_timers_is_no_timer);
+    return UNITY_END();
+}
