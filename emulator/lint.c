@@ -327,8 +327,11 @@ static void judge_turn(lint *l, const lint_station *s, const observation *seen, 
     else if (s->unread > 0)
         find(l, s, seen, LINT_UNREAD_REPLY, bytes, count, "%lu byte%s unread, the last answer was that to %s",
              (unsigned long)s->unread, s->unread == 1 ? " was" : "s were", before);
+    else if (s->read_behind)
+        find(l, s, seen, LINT_UNREAD_REPLY, bytes, count, "the last of the answer to %s was read behind this", before);
     const uint64_t pause_us = us_between(s->reply_ns > s->command_ns ? s->reply_ns : s->command_ns, s->began_ns);
-    if (pause_us + s->late_us < LINT_PAUSE_US && s->unread == 0) /* one that did not read has no pause to make */
+    if (pause_us + s->late_us < LINT_PAUSE_US && s->unread == 0 &&
+        !s->read_behind) /* one that did not read has no pause to make */
         find(l, s, seen, LINT_HURRIED_COMMAND, bytes, count, "%llu.%llu ms after the answer to %s",
              (unsigned long long)pause_us / 1000u, (unsigned long long)pause_us / 100u % 10u, before);
 }
@@ -410,7 +413,9 @@ static void bytes_from_host(lint *l, lint_station *s, const observation *seen)
             s->pause_us = 0;
             s->late_us = i == 0 ? seen->late_us : 0;
             s->unread = i == 0 ? seen->unread : 0;
+            s->read_behind = i == 0 && seen->has_read_behind;
         } else if (i == 0) {
+            s->read_behind = s->read_behind || seen->has_read_behind;
             s->pause_us = seen->pause_us > UINT32_MAX - s->pause_us ? UINT32_MAX : s->pause_us + seen->pause_us;
             s->late_us = seen->late_us > UINT32_MAX - s->late_us ? UINT32_MAX : s->late_us + seen->late_us;
         }

@@ -71,6 +71,7 @@ typedef struct {
     uint32_t late_us;    /* what may be missing of the pauses within it and before it: the emulator was late */
     uint32_t pause_us;   /* within it */
     uint32_t unread;     /* when it began */
+    bool read_behind;    /* something that should have been read before it */
     uint64_t command_ns; /* the last whole command; 0: none yet */
     uint64_t reply_ns;   /* the end of the last reply; 0: none since the last command */
     dr_op last;          /* the last command */

@@ -268,6 +268,7 @@ static bool set_up(program *p)
         station *const s = &e->stations[i];
         s->name = o->rig.members[i].name;
         s->link = o->rig.members[i].link;
+        s->watches_reads = o->lints;
         setup_apply(&o->rig.members[i].setup, &s->ins, s->drives);
         faults_init(&s->ins.faults, o->seed + i);
     }

@@ -45,10 +45,11 @@ typedef struct {
     uint64_t real_ns;      /* CLOCK_MONOTONIC */
     const uint8_t *bytes;  /* FROM_HOST, TO_HOST, LOST */
     size_t count;
-    uint32_t pause_us;         /* FROM_HOST: since the host's bytes before, in real time; UINT32_MAX: longer */
-    uint32_t late_us;          /* FROM_HOST: of the time since they were told before, the emulator had no processor */
-    uint32_t unread;           /* FROM_HOST, CLOSED, END: bytes for the host that it had not read when it did this */
-    const dr_note *note;       /* NOTE */
+    uint32_t pause_us;    /* FROM_HOST: since the host's bytes before, in real time; UINT32_MAX: longer */
+    uint32_t late_us;     /* FROM_HOST: of the time since they were told before, the emulator had no processor */
+    uint32_t unread;      /* FROM_HOST, CLOSED, END: bytes for the host that it had not read when it did this */
+    bool has_read_behind; /* FROM_HOST: but then it read what it should have read before, quicker than it was seen */
+    const dr_note *note;  /* NOTE */
     const struct termios *tty; /* TTY */
     uint32_t baud;             /* TTY: the rate that the host has set; no standard one has a name in a termios */
     const char *text;          /* FAULT, EVENT: one line */

@@ -1,14 +1,16 @@
 #include "station.h"
 
-#include "late.h" /* how far pauses can be believed */
-#include "link.h" /* the stable name */
-#include "tty.h"  /* the rate that the host has set */
+#include "late.h"  /* how far pauses can be believed */
+#include "link.h"  /* the stable name */
+#include "reads.h" /* when the host reads */
+#include "tty.h"   /* the rate that the host has set */
 
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/inotify.h>
 #include <sys/ioctl.h>
+#include <unistd.h>
 
 #define NS_PER_US UINT64_C(1000)
 #define CHUNK 64u /* bytes that leave at one instant, at most: a reply and what was kept behind it */
@@ -96,7 +98,7 @@ static void tell_faults(station *s)
 bool station_plug(station *s, int inotify_fd, char *why, size_t room)
 {
     const char *const wrong = pty_open(&s->port, inotify_fd);
-    s->link_lock = -1;
+    s->link_lock = s->reads = -1;
     s->told_loss = s->has_unread = s->wants_write = false;
     if (wrong != NULL) {
         (void)snprintf(why, room, "%s: %s", wrong, strerror(errno));
@@ -109,6 +111,8 @@ bool station_plug(station *s, int inotify_fd, char *why, size_t room)
         pty_close(&s->port);
         return false;
     }
+    if (s->watches_reads)
+        s->reads = reads_open(s->port.path);
     s->is_plugged = true;
     return true;
 }
@@ -120,6 +124,8 @@ void station_unplug(station *s, int inotify_fd)
     if (s->link != NULL)
         link_remove(s->link, s->port.path, s->link_lock);
     (void)inotify_rm_watch(inotify_fd, s->port.watch);
+    if (s->reads >= 0)
+        (void)close(s->reads);
     pty_close(&s->port);
     s->port.opens = 0;
     s->port.waiting_count = 0;
@@ -137,6 +143,7 @@ void station_start(station *s, uint64_t now_us, uint64_t now_ns)
 static void send_to_host(station *s, const uint8_t *bytes, size_t count)
 {
     const bool done = s->is_plugged && pty_put(&s->port, bytes, count);
+    s->was_sent = s->was_sent || done;
     if (s->observers != NULL) {
         observation seen = seen_now(s, done ? OBSERVED_TO_HOST : OBSERVED_LOST);
         seen.bytes = bytes;
@@ -227,6 +234,8 @@ void station_take(station *s, uint64_t now_ns)
         s->late_us = late;
         const uint32_t unread = count_unread(s); /* with what has been due since: it had not read that either */
         seen.unread = unread > s->unread ? unread : s->unread;
+        seen.has_read_behind = reads_look(s->reads, s->was_sent) && seen.unread == 0;
+        s->was_sent = false;
         observe(s->observers, &seen);
     }
     (void)instrument_take(&s->ins, pause, s->chunk, s->chunk_count);

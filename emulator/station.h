@@ -18,7 +18,8 @@ struct station {
     const char *name;
     instrument ins; /* as setup_apply() made it */
     dr_drive drives[DR_PORTS];
-    const char *link; /* the port's stable name; NULL: none */
+    const char *link;   /* the port's stable name; NULL: none */
+    bool watches_reads; /* when the host reads is told, too */
 
     /* to be read by anybody */
     observer_link *observers;
@@ -32,6 +33,8 @@ struct station {
     bool wants_write;            /* waits for the host to read */
     bool told_loss;
     bool told_wedge;
+    int reads;          /* of the host, see reads.h */
+    bool was_sent;      /* something, since the host's last bytes came */
     uint64_t late_us;   /* as late_us() said then */
     uint64_t read_ns;   /* when the host's last bytes came */
     uint64_t now_ns;    /* real time, as the last call said */

@@ -78,6 +78,8 @@ void bench_say(bench *b, const void *bytes, size_t count)
     seen.count = count;
     seen.pause_us = (uint32_t)((b->real_ns - b->wrote_ns) / NS_PER_US);
     seen.late_us = b->late_us;
+    seen.has_read_behind = b->has_read_behind;
+    b->has_read_behind = false;
     b->late_us = 0;
     b->wrote_ns = b->real_ns;
     observe(&b->link, &seen);

@@ -15,7 +15,8 @@ typedef struct {
     uint32_t unread; /* what waits for the host */
     uint8_t got[64]; /* the newest of it */
     size_t got_count;
-    uint32_t late_us; /* of the next thing that the host says, once */
+    uint32_t late_us;     /* of the next thing that the host says, once */
+    bool has_read_behind; /* with the next thing that it says, once */
 } bench;
 
 /* An MPC-200 with two MP-225, or a TRIO with an MP-845, watched by `who`; the port has been opened. */

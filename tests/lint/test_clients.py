@@ -1,4 +1,4 @@
-"""Host programs as people write them, all of them right, in their own ways with a port: the lint has nothing to say, with either
+"""Host programs as people write them, all but one of them right, in their own ways with a port: the lint has nothing to say, with either
 controller, at any clock.
 
     test_clients.py                              the tests
@@ -196,6 +196,17 @@ class Clients(unittest.TestCase):
 
     def test_c_blocking(self):
         self.keeps_the_rules(os.environ["CLIENT"], "KIND", "blocking")
+
+    def test_c_that_leaves_a_byte(self):
+        """However quick it reads it with the next answer."""
+        for kind in ("trio", "mpc"):
+            for clock in ("real", "jump"):
+                with self.subTest(f"{kind} {clock}"):
+                    done = subprocess.run([os.environ["DRYRIG_EMU"], "run", kind, "--clock", clock, "--strict", "--",
+                                           os.environ["CLIENT"], kind, "leaving"],
+                                          capture_output=True, text=True, check=False, timeout=LONGEST_S)
+                    self.assertEqual(3, done.returncode)
+                    self.assertRegex(done.stderr, "unread-reply, 1 time|thirteen-bytes, 1 time")
 
     def test_c_polling(self):
         self.keeps_the_rules(os.environ["CLIENT"], "KIND", "polling")

@@ -623,6 +623,35 @@ static void a_program_that_reads_12_bytes_of_14_leaves_2_unread(void)
     found(LINT_UNREAD_REPLY, 1);
 }
 
+/* So quick that nothing is unread any more when its command is taken in. */
+static void a_program_that_reads_the_rest_behind_its_next_command_is_named(void)
+{
+    start(DR_MPC);
+    ask("C");
+    bench_wait_us(&b, 3000);
+    b.has_read_behind = true;
+    bench_say(&b, "K", 1);
+    bench_read(&b, ALL);
+    found(LINT_UNREAD_REPLY, 1);
+    TEST_ASSERT_EQUAL_STRING("the last of the answer to position was read behind this", l.findings[0].text);
+    ask("K");
+    found(LINT_UNREAD_REPLY, 1);
+}
+
+static void the_rest_that_is_read_within_the_next_command_is_named(void)
+{
+    uint8_t frame[DR_FRAME_MAX];
+    start(DR_MPC);
+    ask("F");
+    const size_t count = bench_frame(frame, "S\x0F", 2, 1600, 0, 0);
+    bench_wait_us(&b, 3000);
+    bench_say(&b, frame, 2);
+    bench_wait_us(&b, 30000);
+    b.has_read_behind = true;
+    bench_say(&b, frame + 2, count - 2);
+    found(LINT_UNREAD_REPLY, 1);
+}
+
 static void a_program_that_ends_with_a_byte_of_the_position_unread_is_named(void)
 {
     start(DR_TRIO);
@@ -793,6 +822,8 @@ int main(void)
     RUN_TEST(a_program_that_goes_on_when_the_13th_byte_is_there_is_named);
     RUN_TEST(a_program_that_goes_on_when_the_12th_byte_is_there_is_early);
     RUN_TEST(a_program_that_reads_12_bytes_of_14_leaves_2_unread);
+    RUN_TEST(a_program_that_reads_the_rest_behind_its_next_command_is_named);
+    RUN_TEST(the_rest_that_is_read_within_the_next_command_is_named);
     RUN_TEST(a_program_that_ends_with_a_byte_of_the_position_unread_is_named);
     RUN_TEST(a_speed_of_16_is_too_high);
     RUN_TEST(a_speed_of_15_is_not);
