@@ -65,6 +65,7 @@ static void moving_to(uint32_t x, unsigned level)
     run_us(2000);
     run_until_sent(before + 14);
     expect_state(DR_GUARD_MOVING_S);
+    TEST_ASSERT_EQUAL(0, rig.guard.running >> DR_TIMER_SEND & 1);
 }
 
 static void a_silent_controller_is_asked_ten_times_in_pauses_that_grow(void)
@@ -181,6 +182,45 @@ static void a_cable_may_tear_a_frame_until_100_ms_behind_it(void)
     run_us(100000);
     cables(true, false);
     expect_fault(DR_FAULT_NO_DEVICE);
+    proved(); /* the shortest frame that can be torn has two bytes */
+    host_value('A', 45);
+    run_until_sent(3);
+    cables(true, false);
+    expect_fault(DR_FAULT_TORN);
+}
+
+/* An MPC-200's line pauses behind its second byte; a stop that comes then has to wait, and what it waits for begins then. */
+static void a_stop_within_a_line_begins_when_the_line_has_left(void)
+{
+    static const uint8_t at_home[] = {1, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x0D};
+    bench_mpc();
+    rig.by_hand = true;
+    bench_start();
+    run_us(1000000);
+    device_says(at_home, 14);
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    device_says(at_home, 14);
+    run_us(100000);
+    device_says(at_home, 14);
+    expect_state(DR_GUARD_IDLE);
+    host_line(15, 84000, 80000, 80000);
+    run_us(2000);
+    device_says(at_home, 14);
+    run_us(2000);
+    const uint32_t before = rig.wire_count;
+    run_us(10000);
+    TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
+    host_code(3);
+    expect_state(DR_GUARD_STOPPING);
+    run_us(24000); /* 35 ms behind the second byte */
+    run_until_sent(before + 13);
+    TEST_ASSERT_EQUAL_UINT32(100000, rig.guard.at[DR_TIMER_TASK] - guard_clock());
+    TEST_ASSERT_EQUAL_UINT32(150000, rig.guard.at[DR_TIMER_REPEAT] - guard_clock());
+    TEST_ASSERT_EQUAL_UINT32(1000000, rig.guard.at[DR_TIMER_PROOF] - guard_clock());
+    run_us(100);
+    TEST_ASSERT_EQUAL(1, wire_stops());
 }
 
 static void the_end_is_read_2_ms_behind_its_cr(void)
@@ -329,7 +369,8 @@ static void one_call_does_sixteen_things_that_are_due(void)
     (void)dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 0);
     /* A proof's TASK, READ and READ again are three things an attempt: five attempts, and the sixth's TASK. */
     TEST_ASSERT_EQUAL(10 - 5, rig.guard.attempts);
-    TEST_ASSERT_TRUE(dr_guard_due(&rig.guard, &(dr_us){0}));
+    TEST_ASSERT_EQUAL(1, rig.guard.running >> DR_TIMER_READ & 1);
+    TEST_ASSERT_EQUAL_UINT32(rig.clock_at_start + 26000000, rig.guard.at[DR_TIMER_READ]); /* 1 + 3 + 4 + 5 + 6 + 7 s */
 }
 
 static void a_flipped_bit_among_the_timers_is_no_timer(void)
@@ -352,6 +393,7 @@ int main(void)
     RUN_TEST(a_frame_may_pause_for_100_ms_and_take_300_ms);
     RUN_TEST(a_motion_has_one_and_a_half_times_its_way_and_2_s);
     RUN_TEST(a_cable_may_tear_a_frame_until_100_ms_behind_it);
+    RUN_TEST(a_stop_within_a_line_begins_when_the_line_has_left);
     RUN_TEST(the_end_is_read_2_ms_behind_its_cr);
     RUN_TEST(rest_is_proved_by_two_readings_in_quiet_and_ctrl_c_is_repeated_until_a_cr);
     RUN_TEST(rest_that_is_not_proved_in_1_s_is_a_fault_and_is_asked_for_every_500_ms);
