@@ -95,9 +95,11 @@ static dryrig_position nowhere(void)
 
 typedef struct {
     uint64_t began_us, heard_us, watched_us, stopped_us;
-    int stops;    /* ^C sent */
-    bool by_hand; /* 'I': STOP on the ROE [P, stop-says-i] */
-    bool hunting; /* lost the thread; looks for a signature */
+    int stops;     /* ^C sent */
+    bool by_hand;  /* 'I': STOP on the ROE [P, stop-says-i] */
+    bool by_guard; /* 'E' and nothing else: a guard before the controller has refused it */
+    bool is_first; /* the byte that is looked at is the first */
+    bool hunting;  /* lost the thread; looks for a signature */
     uint8_t held[DR_STREAM_FRAME];
     size_t count;
 } watch;
@@ -158,6 +160,8 @@ static bool read_held(dryrig *d, const plan *p, watch *w)
             return true;
         if (!w->hunting && byte == 'I' && d->kind == DR_MPC)
             w->by_hand = w->stops == 0;
+        else if (!w->hunting && w->is_first && byte == DR_NO_SUCH_DRIVE) /* no controller answers a motion so */
+            w->by_guard = w->stops == 0;
         else if (byte != 0 || d->kind != DR_MPC) /* heartbeats [P, nul-heartbeat] */
             w->hunting = true;
     }
@@ -183,7 +187,7 @@ static bool give_up_frame(watch *w)
 
 static bool interrupt_is_wanted(dryrig *d) { return __atomic_load_n(&d->interrupted, __ATOMIC_SEQ_CST) != 0; }
 
-typedef enum { TIME_UP, ENDED, BY_HAND } outcome; /* or a negative error */
+typedef enum { TIME_UP, ENDED, NO_CR } outcome; /* or a negative error */
 
 /* Takes what the line has within timeout_us. ENDED: and a CR ended it. */
 static int take(dryrig *d, const plan *p, watch *w, uint32_t timeout_us)
@@ -194,7 +198,10 @@ static int take(dryrig *d, const plan *p, watch *w, uint32_t timeout_us)
         return count;
     w->heard_us = count > 0 ? now_us(d) : w->heard_us;
     for (int i = 0; i < count; i++) {
-        if (read_byte(d, p, w, bytes[i])) {
+        w->by_guard = false;
+        const bool has_ended = read_byte(d, p, w, bytes[i]);
+        w->is_first = false;
+        if (has_ended) {
             if (i + 1 < count) /* something behind the end */
                 d->doubt = DOUBT_LATE;
             return ENDED;
@@ -225,8 +232,8 @@ static int wait_for_end(dryrig *d, const plan *p, watch *w, uint64_t until_us)
         const uint64_t left_us = until_us - at_us;
         result = take(d, p, w, left_us < SLICE_US ? (uint32_t)left_us : SLICE_US);
         if (result == TIME_UP && now_us(d) - w->heard_us >= TORN_US) {
-            if (w->by_hand)
-                return BY_HAND; /* its CR never comes */
+            if (w->by_hand || w->by_guard)
+                return NO_CR; /* it never comes */
             result = give_up_frame(w) ? ENDED : TIME_UP;
         }
         if (result != TIME_UP)
@@ -265,6 +272,9 @@ static int judge(dryrig *d, const plan *p, const watch *w, const dryrig_position
     if (w->by_hand)
         return fail(d, DRYRIG_ERR_STOPPED, "STOP was pressed on the ROE; the stage stands at %s", place_of(end).text);
     const bool moved = !same_place(&p->start, end);
+    if (w->by_guard && !moved)
+        return fail(d, DRYRIG_ERR_REFUSED,
+                    "a guard before the controller has refused it; 'dryrig-guard ctl SOCKET status' says why");
     bool exact = true, near = true;
     for (size_t axis = 0; axis < DR_AXES; axis++) {
         const int64_t off = p->known[axis] ? (int64_t)end->steps[axis] - (int64_t)p->request.steps[axis] : 0;
@@ -323,6 +333,7 @@ static int run(dryrig *d, const plan *p, dryrig_position *end)
 {
     watch w;
     memset(&w, 0, sizeof w);
+    w.is_first = true;
     const bool stoppable = p->row.is & DR_IS_STOPPABLE;
     __atomic_store_n(&d->stoppable, stoppable ? STOPPABLE : UNSTOPPABLE, __ATOMIC_SEQ_CST);
     int result = send(d, &p->request);

@@ -1,4 +1,5 @@
 """dryrig-guard between a host and an emulator: what passes, what does not, what stops."""
+import json
 import os
 import resource
 import subprocess
@@ -87,6 +88,18 @@ class Refusing(unittest.TestCase):
     def test_E_where_the_configuration_says_so(self):
         with guarded("mpc", rig(guard.MPC, high=1000, more='refusal = "E";'), *FAST) as (_, _, port):
             self.assertEqual(port.ask(move_mpc(1001, 0, 0), 1), b"E")
+
+    def test_the_host_library_knows_E(self):
+        """And the next command works: it is not out of step."""
+        for kind, config, stage in (("mpc", guard.MPC, "MP-225"), ("trio", guard.TRIO, "MP-845")):
+            with guarded(kind, rig(config, high=2000, more='refusal = "E"; stay_armed = true;'), *FAST) as (_, g, port):
+                port.close()
+                for words, error in (("move 2100 1000 1000", "refused"), ("line 2100 1000 1000 --speed 15", "refused"),
+                                     ("line 1100 1000 1000 --speed 15", None)):
+                    done = subprocess.run([os.environ["DRYRIG"], "-p", g.path, "-c", kind, "-s", stage, "--json", *words.split()],
+                                          capture_output=True, timeout=emu.LIMIT_S, check=False)
+                    told = json.loads(done.stdout.decode().splitlines()[-1])
+                    self.assertEqual((words, told.get("error"), done.returncode), (words, error, 0 if error is None else 1))
 
     def test_nothing_moves_before_it_is_armed(self):
         with emu.directory() as directory, emu.Emulator("mpc", *FAST) as e, Guard(directory, e.path, rig(guard.MPC)) as g:

@@ -920,6 +920,7 @@ SPOILS(any_answer_byte_lost, false, DROP, 0, 0)
 SPOILS(any_answer_byte_twice, false, TWICE, 0, 0)
 SPOILS(a_stray_cr_anywhere, false, AFTER_EXTRA, 0x0D, 0)
 SPOILS(a_stray_i_anywhere, false, AFTER_EXTRA, 'I', 0)
+SPOILS(a_stray_e_anywhere, false, AFTER_EXTRA, 'E', 0)
 SPOILS(a_stray_nul_anywhere, false, AFTER_EXTRA, 0, 0)
 SPOILS(a_stray_ff_anywhere, false, AFTER_EXTRA, 0xFF, 0)
 SPOILS(a_stray_1_anywhere, false, AFTER_EXTRA, 1, 0)
@@ -977,6 +978,8 @@ int main(void)
     RUN_TEST(a_stray_cr_anywhere_mpc);
     RUN_TEST(a_stray_i_anywhere_trio);
     RUN_TEST(a_stray_i_anywhere_mpc);
+    RUN_TEST(a_stray_e_anywhere_trio);
+    RUN_TEST(a_stray_e_anywhere_mpc);
     RUN_TEST(a_stray_nul_anywhere_trio);
     RUN_TEST(a_stray_nul_anywhere_mpc);
     RUN_TEST(a_stray_ff_anywhere_trio);
