@@ -241,6 +241,7 @@ static void rest_is_proved_by_two_readings_in_quiet_and_ctrl_c_is_repeated_until
 {
     moving_to(48000, 15);
     run_us(100000);
+    const dr_us idle = rig.guard.at[DR_TIMER_IDLE];
     host_code(3);
     TEST_ASSERT_EQUAL_UINT32(1000000, rig.guard.at[DR_TIMER_PROOF] - guard_clock());
     due_in(100000);
@@ -265,6 +266,8 @@ static void rest_is_proved_by_two_readings_in_quiet_and_ctrl_c_is_repeated_until
     says_at(41000);
     expect_state(DR_GUARD_IDLE);
     TEST_ASSERT_EQUAL(3, wire_stops());
+    TEST_ASSERT_EQUAL_UINT32(idle,
+                             rig.guard.at[DR_TIMER_IDLE]); /* none of this was a motion: 900 s count from the last */
 }
 
 static void rest_that_is_not_proved_in_1_s_is_a_fault_and_is_asked_for_every_500_ms(void)
@@ -291,6 +294,36 @@ static void rest_that_is_not_proved_in_1_s_is_a_fault_and_is_asked_for_every_500
     run_us(500000);
     says_at(43000);
     TEST_ASSERT_FALSE(status().buzzer);
+}
+
+static void idleness_disarms_and_does_nothing_to_a_fault(void)
+{
+    armed();
+    run_us(899999999);
+    expect_state(DR_GUARD_IDLE);
+    run_us(1);
+    expect_state(DR_GUARD_DISARMED);
+    armed();
+    device_says("0123456789abcdefg", 17);
+    expect_state(DR_GUARD_FAULT);
+    run_us(1000000000);
+    expect_state(DR_GUARD_FAULT);
+    expect_fault(DR_FAULT_DEVICE_NOISE);
+}
+
+static void a_motion_that_cannot_be_stopped_is_one_from_its_first_byte(void)
+{
+    armed();
+    host_axis('x', 40800);
+    run_us(2000);
+    says_at(40000);
+    run_us(1999);
+    expect_state(DR_GUARD_CHECKING);
+    const uint32_t before = rig.wire_count;
+    run_until_sent(before + 1);
+    expect_state(DR_GUARD_MOVING_U);
+    run_until_sent(before + 5);
+    expect_state(DR_GUARD_MOVING_U);
 }
 
 static void tokens_for_motions_come_back_every_50_ms(void)
@@ -397,6 +430,8 @@ int main(void)
     RUN_TEST(the_end_is_read_2_ms_behind_its_cr);
     RUN_TEST(rest_is_proved_by_two_readings_in_quiet_and_ctrl_c_is_repeated_until_a_cr);
     RUN_TEST(rest_that_is_not_proved_in_1_s_is_a_fault_and_is_asked_for_every_500_ms);
+    RUN_TEST(idleness_disarms_and_does_nothing_to_a_fault);
+    RUN_TEST(a_motion_that_cannot_be_stopped_is_one_from_its_first_byte);
     RUN_TEST(tokens_for_motions_come_back_every_50_ms);
     RUN_TEST(noise_is_counted_by_the_second);
     RUN_TEST(stop_contacts_may_disagree_for_50_ms_and_bounce_for_20_ms);

@@ -196,6 +196,102 @@ static void what_a_late_caller_finds_is_logged_with_the_instant_when_it_was_due(
     TEST_ASSERT_TRUE(logs_state(DR_GUARD_IDLE, DR_GUARD_DISARMED, due));
 }
 
+/* -- What is left when the seal is broken ------------------------------------------------------------------------------- */
+
+/* As it is now, but for one bit of a counter that decides nothing; and what the guard makes of it. */
+static void break_seal(bool torn)
+{
+    dr_guard_push_host(&rig.guard, guard_clock(), NULL, 0);
+    SEALED();
+    rig.guard.forwarded ^= 0x100;
+    expect_state(DR_GUARD_LOCKED); /* at once, by who only looks */
+    expect_fault(DR_FAULT_DAMAGED);
+    TEST_ASSERT_EQUAL(DR_NEEDS_LIMITS, status().needs);
+    TEST_ASSERT_FALSE(dr_guard_self_check(&rig.guard, guard_clock()));
+    expect_state(DR_GUARD_LOCKED);
+    expect_fault(DR_FAULT_DAMAGED);
+    TEST_ASSERT_EQUAL(torn, status().confirm_wanted);
+    TEST_ASSERT_EQUAL(DR_REASON_NONE, status().last_refusal.reason);
+    TEST_ASSERT_EQUAL(DR_AXES, status().last_refusal.axis);
+    TEST_ASSERT_EQUAL(DR_NO_ITEM, status().last_refusal.item);
+    uint8_t bytes[20];
+    TEST_ASSERT_EQUAL(torn ? 0 : 1, dr_guard_pull_device(&rig.guard, guard_clock(), bytes, sizeof bytes));
+    if (!torn)
+        TEST_ASSERT_EQUAL_HEX8(0x03, bytes[0]);
+    SEALED();
+    expect_state(DR_GUARD_LOCKED);
+    host("\x03", 1); /* ^C passes, unless it might complete a frame */
+    TEST_ASSERT_EQUAL(torn ? 0 : 1, dr_guard_pull_device(&rig.guard, guard_clock(), bytes, sizeof bytes));
+}
+
+static void damage_is_answered_by_one_ctrl_c(void)
+{
+    started();
+    read_at_home();
+    break_seal(false);
+    armed();
+    break_seal(false);
+    armed();
+    host(line, 14);
+    later(2000);
+    read_at_home();
+    later(2000);
+    while (pull())
+        ;
+    expect_state(DR_GUARD_MOVING_S);
+    break_seal(false);
+}
+
+static void damage_within_a_frame_is_answered_by_silence(void)
+{
+    armed();
+    host(line, 14);
+    later(2000);
+    read_at_home(); /* allowed, and waits for its turn: who knows what of it was pulled */
+    break_seal(true);
+    static const char at_home_mpc[] = "\x01\x80\x38\x01\0\x80\x38\x01\0\x80\x38\x01\0\r";
+    static const char line_mpc[] = "S\x0F\x20\x48\x01\0\x80\x38\x01\0\x80\x38\x01\0"; /* to 84,000 on X */
+    bench_mpc();
+    rig.by_hand = true;
+    dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64);
+    dr_guard_start(&rig.guard, guard_clock(), DR_START_POWER_ON);
+    dr_guard_link(&rig.guard, guard_clock(), true, true);
+    dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_KEY, true);
+    static const uint32_t reading_after_us[] = {1000000, 2000, 100000, 2000};
+    for (size_t i = 0; i < 4; i++) {
+        if (i == 1)
+            dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_ARM, true);
+        if (i == 3)
+            host(line_mpc, 14);
+        later(reading_after_us[i]);
+        TEST_ASSERT_TRUE(pull());
+        push(at_home_mpc, 14);
+    }
+    later(2000);
+    TEST_ASSERT_TRUE(pull());
+    TEST_ASSERT_TRUE(pull());
+    TEST_ASSERT_FALSE(pull()); /* the pause behind 'S' and the speed */
+    SEALED();
+    dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_STOP, true); /* waits for the frame */
+    expect_state(DR_GUARD_STOPPING);
+    rig.guard.stops_out = 0; /* else it is open */
+    rig.guard.sealed = 0;
+    break_seal(true);
+}
+
+/* A torn frame is written down twice: the bit that is flipped may be one of the two. */
+static void damage_forgets_no_torn_frame(void)
+{
+    for (unsigned i = 0; i < 3; i++) {
+        started();
+        read_at_home();
+        rig.guard.sealed = 0;
+        rig.guard.torn = i != 1;
+        rig.guard.fault = i == 0 ? DR_FAULT_NONE : DR_FAULT_TORN;
+        break_seal(true);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -205,5 +301,8 @@ int main(void)
     RUN_TEST(a_stop_is_open_until_it_has_left);
     RUN_TEST(a_change_of_the_state_is_logged_by_the_call_that_makes_it);
     RUN_TEST(what_a_late_caller_finds_is_logged_with_the_instant_when_it_was_due);
+    RUN_TEST(damage_is_answered_by_one_ctrl_c);
+    RUN_TEST(damage_within_a_frame_is_answered_by_silence);
+    RUN_TEST(damage_forgets_no_torn_frame);
     return UNITY_END();
 }
