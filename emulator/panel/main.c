@@ -315,6 +315,7 @@ static bool open_signals(panel *p)
     sigset_t caught;
     (void)sigemptyset(&caught);
     (void)sigaddset(&caught, SIGINT);
+    (void)sigaddset(&caught, SIGQUIT);
     (void)sigaddset(&caught, SIGTERM);
     (void)sigaddset(&caught, SIGHUP);
     (void)sigprocmask(SIG_BLOCK, &caught, NULL);

@@ -313,7 +313,7 @@ static int wrap(const char *text, int indent_behind, int row, int from, int to)
         const int indent = line == 0 ? 0 : indent_behind, width = COLS - indent;
         int length = (int)strlen(text);
         if (length > width) {
-            for (length = width; length > width / 2 && text[length] != ' ';)
+            for (length = width; length > (width + 1) / 2 && text[length] != ' ';) /* a character at least */
                 length--;
         }
         if (line >= from && line < to)

@@ -25,7 +25,7 @@ class Terminal:
         with open(os.path.join(self.context.name, "conf"), "w", encoding="ascii") as conf:
             conf.write(f"set -g default-terminal {term}\nset -g status off\n")
         command = " ".join(f"'{word}'" for word in args)
-        shell = (f"trap : INT; stty -g >{self.before}; {command}; echo \"status $?\"; stty -g >{self.after}.part;"
+        shell = (f"trap : INT QUIT; stty -g >{self.before}; {command}; echo \"status $?\"; stty -g >{self.after}.part;"
                  f" mv {self.after}.part {self.after}; exec cat")
         self.tmux("-f", os.path.join(self.context.name, "conf"), "new-session", "-d", "-s", "panel", "-x", str(columns),
                   "-y", str(rows), "sh", "-c", shell)
@@ -218,6 +218,10 @@ class Screens(unittest.TestCase):
             t.resize(80, 24)
             emu.wait_until(lambda: "? help" in t.rows()[23], "it fits the new size")
             t.shows("ABSOLUTE", "s SPEED (LOCK)")
+            t.resize(1, 5)  # no word fits, nor half of one
+            emu.wait_until(lambda: t.rows()[0] == "T", "it draws on a single column")
+            t.resize(80, 24)
+            t.shows("ABSOLUTE", "s SPEED (LOCK)")
             t.keys("q")
             t.ended(0)
 
@@ -377,7 +381,7 @@ class Keys(unittest.TestCase):
 class Ends(unittest.TestCase):
     def test_q_and_signals(self):
         with trio() as e:
-            for how in ("q", "C-c", signal.SIGTERM, signal.SIGHUP):
+            for how in ("q", "C-c", "C-\\", signal.SIGTERM, signal.SIGHUP):
                 with Terminal(PANEL, e.socket_path) as t:
                     t.shows("ABSOLUTE")
                     if isinstance(how, str):
