@@ -86,7 +86,10 @@ uint32_t dr_judge_speed(const dr_limits *l, uint8_t drive, uint8_t level, bool f
 
 bool dr_limits_check(const dr_limits *l, dr_limits_problem *problem) { return (void)l, (void)problem, anything(); }
 uint32_t dr_limits_crc(const dr_limits *l) { return (void)l, anything_32(); }
-uint32_t dr_crc32c(uint32_t crc, const uint8_t *bytes, size_t count) { return (void)crc, (void)bytes, (void)count, anything_32(); }
+uint32_t dr_crc32c(uint32_t crc, const uint8_t *bytes, size_t count)
+{
+    return (void)crc, (void)bytes, (void)count, anything_32();
+}
 void dr_log_init(dr_log *log, dr_record *ring, uint16_t size) { *log = (dr_log){ring, size, 0, 0, 0, 0, 0}; }
 void dr_log_put(dr_log *log, dr_record *record) { (void)log, (void)record; }
 bool dr_log_take(dr_log *log, dr_record *out) { return (void)log, (void)out, false; }

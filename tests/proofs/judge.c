@@ -146,8 +146,7 @@ void proof_box(void)
     proved();
 }
 
-/* -- Obstacles ------------------------------------------------------------------------------------------------------------ */
-
+/* -- Obstacles -------------------------------------------------------------------------------------------------------- */
 
 /* A point of the way: between the ends, in the order of the axes where one is documented; on the line for 'S'. */
 static int32_t p_q[DR_AXES];
@@ -189,7 +188,10 @@ void proof_keep_out(void)
 
 /* -- The way out ---------------------------------------------------------------------------------------------------------- */
 
-static int64_t outside(int32_t at, int32_t min, int32_t max) { return at < min ? (int64_t)min - at : at > max ? (int64_t)at - max : 0; }
+static int64_t outside(int32_t at, int32_t min, int32_t max)
+{
+    return at < min ? (int64_t)min - at : at > max ? (int64_t)at - max : 0;
+}
 
 void proof_escape(void)
 {
