@@ -34,7 +34,8 @@ static struct {
     bool confirmed; /* since the start */
     bool host_is_open;
 
-    dr_us shown;
+    dr_us looked_at_guard;
+    bool may_move;  /* a frame has begun to leave, and no end was seen */
     uint8_t steady; /* outputs */
     bool has_power, wave;
 
@@ -43,7 +44,7 @@ static struct {
 
     uint32_t limits_sum, sum; /* as they were read; of the pieces so far */
     size_t summed;
-    bool damaged;
+    bool damaged; /* that, or the clock: a reset is due */
     dr_us round;
 } b;
 static volatile dr_survivor *survivor;
@@ -59,7 +60,7 @@ static void send_device(dr_us now)
         return;
     while (dr_port_line_room(DR_LINE_DEVICE) > 0 && dr_guard_pull_device(&b.guard, now, &byte, 1) == 1) {
         if (dr_guard_is_mid_frame(&b.guard))
-            survivor->mid_frame = true;
+            survivor->mid_frame = b.may_move = true;
         dr_port_line_write(DR_LINE_DEVICE, &byte, 1);
     }
     if (survivor->mid_frame && !dr_guard_is_mid_frame(&b.guard) && dr_port_line_is_sent(DR_LINE_DEVICE))
@@ -68,7 +69,8 @@ static void send_device(dr_us now)
 
 /* -- From the host and the controller ------------------------------------------------------------------------------ */
 
-static void hear_host(dr_us now)
+/* False: it said nothing. */
+static bool hear_host(dr_us now)
 {
     uint8_t bytes[DR_FRAME_MAX];
     bool lost = false;
@@ -77,6 +79,7 @@ static void hear_host(dr_us now)
         dr_guard_host_line_error(&b.guard, now);
     if (count > 0)
         dr_guard_push_host(&b.guard, now, bytes, count);
+    return count > 0;
 }
 
 /* A reply that lacks a byte is none: the guard asks again. */
@@ -142,15 +145,18 @@ static bool may_have_power(const dr_guard_status *status)
     return b.has_limits && !status->cut && (!moves || b.confirmed);
 }
 
-static void show(dr_us now)
+static void look_at_guard(dr_us now)
 {
-    if (now - b.shown >= SHOW_US) {
-        dr_guard_status status;
-        b.shown = now;
-        dr_guard_get_status(&b.guard, &status);
-        b.steady = (uint8_t)((status.buzzer ? BUZZER : 0u) | (lamp(&status, now) ? LAMP : 0u));
-        b.has_power = may_have_power(&status);
-    }
+    dr_guard_status status;
+    b.looked_at_guard = now;
+    dr_guard_get_status(&b.guard, &status);
+    b.steady = (uint8_t)((status.buzzer ? BUZZER : 0u) | (lamp(&status, now) ? LAMP : 0u));
+    b.has_power = may_have_power(&status);
+    b.may_move = status.state >= DR_GUARD_CHECKING && status.state <= DR_GUARD_STOPPING;
+}
+
+static void drive_outputs(void)
+{
     b.wave = b.has_power && !b.wave;
     dr_port_outputs((uint8_t)(b.steady | (b.wave ? RELAY : 0u)));
 }
@@ -175,7 +181,7 @@ static void tell_log(void)
 {
     dr_record record;
     const size_t room = dr_port_line_room(DR_LINE_LOG);
-    if (b.log_left == 0 && room > 0 && dr_guard_pull_log(&b.guard, &record))
+    if (b.log_left == 0 && room > 0 && !b.may_move && dr_guard_pull_log(&b.guard, &record)) /* slow: a ^C would wait */
         put_log_line(&record);
     const size_t count = b.log_left < room ? b.log_left : room;
     dr_port_line_write(DR_LINE_LOG, b.log_line + LOG_LINE - b.log_left, count);
@@ -197,30 +203,37 @@ static void check_limits(void)
     b.sum = 0;
 }
 
-/* Fed by a round in which all that must hold did: the loop came round, and the clock went on, but not too far. */
+/* Fed by a round in which all that must hold did: the loop came round, the clock went on, and has never gone too far. */
 static void feed_watchdog(dr_us now)
 {
     const dr_us lasted = now - b.round;
     b.round = now;
     check_limits();
-    if (!b.damaged && dr_port_stack_holds() && lasted > 0 && lasted < LONGEST_ROUND_US)
+    b.damaged = b.damaged || lasted > LONGEST_ROUND_US;
+    if (!b.damaged && dr_port_stack_holds() && lasted > 0)
         dr_port_watchdog_feed();
 }
 
 /* -- The loop ------------------------------------------------------------------------------------------------------ */
 
-/* The way of a stop comes first. It never sleeps: contacts have no interrupt. */
+/* The way of a stop comes first, and again before what takes longer, one thing a round. It never sleeps: contacts have no interrupt. */
 void dr_bridge_step(void)
 {
     const dr_us now = dr_port_now_us();
-    hear_host(now);
+    (void)hear_host(now);
     look_at_inputs(now);
     send_device(now);
     hear_device(now);
     answer_host(now);
-    tell_log();
-    show(now);
-    feed_watchdog(now);
+    drive_outputs();
+    if (hear_host(now))
+        send_device(now);
+    if (now - b.looked_at_guard >= SHOW_US) {
+        look_at_guard(now);
+    } else {
+        tell_log();
+        feed_watchdog(now);
+    }
 }
 
 /* -- The start ----------------------------------------------------------------------------------------------------- */
