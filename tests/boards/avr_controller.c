@@ -15,7 +15,7 @@ static dr_drive drives[DR_PORTS];
 static avr_irq_t *input;
 static uint32_t byte_cycles;
 static avr_cycle_count_t line_free; /* when the controller's next byte may begin */
-static char log_line[256]; /* a reset may cut one off, and the next follows */
+static char log_line[256];          /* a reset may cut one off, and the next follows */
 static size_t log_length;
 
 static dr_us now(void) { return (dr_us)(board->cycle / CYCLES_PER_US); }
