@@ -18,7 +18,7 @@ contents of what was compiled and run: what did not change is not run again.
   --sample   so many, drawn by a hash of what they change: the same ones as long as their lines stay as they are
   --only     mutants of the files, functions or lines that have this in them
   --again    only what the run before did not kill
-  --quick    without sanitizers and the longest programs: a first look, of which nothing is kept but kills
+  --quick    without sanitizers and the longest tests: a first look, of which nothing is kept but kills
 
 Exit: 0 at least 97 % of what is left without the argued ones are found, and the list holds; 1 not; 2 nothing was measured:
 the tests fail without a mutant, or a program ended well without having run its tests.
@@ -48,11 +48,11 @@ UNITY = ROOT / '.deps' / 'unity'
 MUTATED = ('dr_geometry', 'dr_limits', 'dr_judge', 'dr_log', 'dr_guard')
 GATE = 97
 FLAGS = ['-std=c99', '-w', '-fPIC', f'-I{CORE}', f'-I{UNITY}', f'-I{HERE}']
-TCC = shutil.which('tcc') or 'gcc'  # ten times as fast as gcc; what it makes is half as fast: for programs that are swift
-SWIFT = 0.05  # seconds
+TCC = shutil.which('tcc') or 'gcc'  # ten times as fast as gcc; what it makes is half as fast: for tests that are swift
+SWIFT = 0.004  # seconds that a test takes: these come first
+LONG = 0.1     # these come last, and not with sanitizers
 QUICK = ['-O1']
 SAFE = ['-O1', '-fsanitize=address,undefined,bounds-strict', '-fno-sanitize-recover=all']
-LONG = ('test_guard_hostile', 'test_guard_stop', 'test_guard_flips')  # not with sanitizers: longer than all others together
 ENVIRONMENT = {'LD_BIND_NOW': '1', 'ASAN_OPTIONS': 'detect_leaks=0:detect_stack_use_after_return=1', 'PATH': os.environ['PATH']}
 WRAP = '-Wl,--wrap=UnityDefaultTestRun'
 SUMMARY = re.compile(rb'^(\d+) Tests (\d+) Failures', re.M)
@@ -195,7 +195,7 @@ def ready(project, at):
         elif not known.exists():
             build(project, at, QUICK if at.name == 'quick' else SAFE)
             seconds = {program: [used for used, _ in traced(program, at / program, [at])]
-                       for program in project.programs if program not in LONG or at.name == 'quick'}
+                       for program in project.programs}
             for program, tests in seconds.items() if at.name == 'quick' else ():
                 for i in range(len(tests)):
                     if run(at / program, [at], 600, PICK='0' * i + '1')[:2] != ('well', 1):
@@ -229,12 +229,13 @@ class Bench:
                             [str(self.at / 'core' / path.name) for path in self.project.sources[module]], compiler=compiler)
                    for module in MUTATED)
 
-    def plan(self, module, function, kind):
-        """(processor time, program, which of its tests): those that run through the function; the quickest first."""
+    def plan(self, module, function, kind, least, most):
+        """(processor time, program, which of its tests): those that run through the function and take so long."""
         plan = []
         for program, (_, modules) in self.project.programs.items():
-            if module in modules and (program not in LONG or kind == 'quick' and not self.is_quick):
-                pick = [function == '(file)' or function in functions for functions in self.runs[program]]
+            if module in modules:
+                pick = [(function == '(file)' or function in functions) and least <= used < most
+                        for functions, used in zip(self.runs[program], self.needs['quick'][program])]
                 seconds = sum(used for used, picked in zip(self.needs[kind][program], pick) if picked)
                 if any(pick):
                     plan.append((seconds, program, ''.join('01'[picked] for picked in pick)))
@@ -266,13 +267,11 @@ class Bench:
     def fate(self, module, name, function, text, first=''):
         """first: the program that killed it when it was tried before."""
         function = function.split(' ')[0]
-        plan = sorted(self.plan(module, function, 'quick'), key=lambda step: step[1] != first)
-        swift, slow = [step for step in plan if step[0] < SWIFT], [step for step in plan if step[0] >= SWIFT]
-        stages = [(TCC, [], swift), ('gcc', QUICK, slow)]
-        for compiler, flags, some in reversed(stages) if first in {step[1] for step in slow} else stages:
-            if (some or compiler == TCC) and not self.libraries(module, name, text, 'quick', compiler, flags):
+        for compiler, flags, least, most in ((TCC, [], 0, SWIFT), ('gcc', QUICK, SWIFT, LONG if self.is_quick else 1000)):
+            if not self.libraries(module, name, text, 'quick', compiler, flags):
                 return 'stillborn', ''
-            fate, by = self.verdict(some, 'quick')
+            plan = self.plan(module, function, 'quick', least, most)
+            fate, by = self.verdict(sorted(plan, key=lambda step: step[1] != first), 'quick')
             if fate != 'survived':
                 return fate, by
         if self.is_identical(name, text):
@@ -282,7 +281,7 @@ class Bench:
         self.needs['safe'] = ready(self.project, self.base / 'safe')
         if not self.libraries(module, name, text, 'safe', 'gcc', SAFE):
             raise RuntimeError(f'{name} compiles without sanitizers only')
-        return self.verdict(self.plan(module, function, 'safe'), 'safe')
+        return self.verdict(self.plan(module, function, 'safe', 0, LONG), 'safe')
 
 
 def prepare(project, work):
