@@ -1,0 +1,195 @@
+/* The last microstep of what the guard believes about the place, on every axis. The test is the controller: a TRIO with an
+ * MP-285 (8 steps/um, 8 quanta/step), an MPC-200 with an MP-225 (16 steps/um) and an MP-845 (3 quanta/step). */
+#include "bench.h"
+
+#include <string.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static const uint32_t home[DR_AXES] = {40000, 40000, 40000};
+
+static void says(const uint32_t steps[DR_AXES]) { device_at(steps[0], steps[1], steps[2], 30); }
+
+static void says_off(uint8_t axis, uint32_t steps)
+{
+    uint32_t at[DR_AXES] = {40000, 40000, 40000};
+    at[axis] = steps;
+    says(at);
+}
+
+static void begun(void)
+{
+    bench_trio();
+    rig.by_hand = true;
+    bench_start();
+    run_us(1000000);
+}
+
+static void armed_with(uint16_t facts)
+{
+    bench_trio();
+    rig.by_hand = true;
+    rig.limits.rig = facts;
+    bench_start();
+    run_us(1000000);
+    says(home);
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    says(home);
+    run_us(100000);
+    says(home);
+    expect_state(DR_GUARD_IDLE);
+}
+
+static void a_reading_may_be_500_um_beyond_the_travel(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        begun();
+        says_off(axis, 200000 + 4000);
+        expect_state(DR_GUARD_DISARMED);
+        begun();
+        says_off(axis, 200000 + 4001);
+        expect_state(DR_GUARD_LOCKED);
+        run_us(100000); /* asked again */
+        says_off(axis, 200000 + 4001);
+        expect_fault(DR_FAULT_IDENTITY);
+    }
+}
+
+static void mpc_says(uint8_t drive, uint8_t axis, uint32_t steps)
+{
+    uint32_t at[DR_AXES] = {80000, 80000, 80000};
+    uint8_t reply[14] = {drive};
+    at[axis] = steps;
+    for (uint8_t i = 0; i < 12; i++)
+        reply[1 + i] = (uint8_t)(at[i / 4] >> (8 * (i % 4)));
+    reply[13] = DR_CR;
+    device_says(reply, sizeof reply);
+}
+
+static void beyond_the_travel_of_the_drive_that_speaks(void)
+{
+    static const struct {
+        uint8_t drive;
+        uint32_t steps;
+        bool plausible;
+    } readings[] = {{1, 400000 + 8000, true}, {1, 400000 + 8001, false}, {2, 543999, true}, {2, 544000, false}};
+    for (size_t i = 0; i < sizeof readings / sizeof readings[0]; i++)
+        for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+            bench_mpc();
+            rig.by_hand = true;
+            TEST_ASSERT_TRUE(dr_limits_init_drive(&rig.limits, 1, DR_STAGE_MPC_MP845));
+            bench_start();
+            run_us(1000000);
+            mpc_says(readings[i].drive, axis, readings[i].steps);
+            expect_state(readings[i].plausible ? DR_GUARD_DISARMED : DR_GUARD_LOCKED);
+        }
+}
+
+static void two_readings_agree_within_2_microsteps(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        for (int32_t off = -3; off <= 3; off++) {
+            begun();
+            says(home);
+            input(DR_INPUT_KEY, true);
+            press(DR_INPUT_ARM);
+            run_us(2000);
+            says(home);
+            run_us(100000);
+            says_off(axis, (uint32_t)(40000 + off));
+            const bool agree = off >= -2 && off <= 2;
+            expect_state(agree ? DR_GUARD_IDLE : DR_GUARD_DISARMED);
+            TEST_ASSERT_EQUAL(!agree, (status().needs & DR_NEEDS_STEADY) != 0);
+        }
+}
+
+/* Asks for a motion of 10 um on another axis; the reading before it says this. */
+static void read_before_a_motion(uint8_t axis, uint32_t steps)
+{
+    host_axis(axis == DR_X ? 'y' : 'x', 40080);
+    run_us(2000);
+    says_off(axis, steps);
+}
+
+static void with_knobs_locked_the_tip_stays_within_20_um(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        for (int side = -1; side <= 1; side += 2) {
+            armed_with(DR_RIG_KNOBS_LOCKED);
+            read_before_a_motion(axis, (uint32_t)(40000 + side * 160));
+            expect_state(DR_GUARD_CHECKING); /* allowed: its turn comes in 2 ms */
+            armed_with(DR_RIG_KNOBS_LOCKED);
+            read_before_a_motion(axis, (uint32_t)(40000 + side * 161));
+            expect_fault(DR_FAULT_POSITION_JUMP);
+            expect_refused(DR_REASON_NO_POSITION);
+        }
+}
+
+static void a_knob_may_have_moved_it_by_5_mm_a_second_and_for_20_s(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        armed_with(0);
+        run_us(498000); /* and 2 ms until the reading: 2,500 um */
+        read_before_a_motion(axis, 40000 + 20000 + 160);
+        expect_state(DR_GUARD_CHECKING);
+        armed_with(0);
+        run_us(498000);
+        read_before_a_motion(axis, 40000 + 20000 + 161);
+        expect_fault(DR_FAULT_POSITION_JUMP);
+    }
+    armed_with(0);
+    rig.limits.knob_q_per_s = 1;
+    limits_changed();
+    run_us(19997999);
+    read_before_a_motion(DR_Z, 50000);
+    expect_fault(DR_FAULT_POSITION_JUMP);
+    armed_with(0);
+    rig.limits.knob_q_per_s = 1;
+    limits_changed();
+    run_us(19998000); /* now the reading is too old to say anything */
+    read_before_a_motion(DR_Z, 50000);
+    expect_state(DR_GUARD_CHECKING);
+}
+
+static void a_motion_ends_within_2_microsteps_of_its_target(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        for (int32_t off = -3; off <= 3; off++) {
+            armed_with(DR_RIG_KNOBS_LOCKED);
+            host_axis(axis == DR_X ? 'y' : 'x', 40080);
+            run_us(2000);
+            says(home);
+            run_us(20000);
+            device_says("\r", 1);
+            run_us(2000);
+            uint32_t end[DR_AXES] = {40080, 40000, 40000};
+            if (axis == DR_X)
+                end[DR_X] = 40000, end[DR_Y] = 40080;
+            end[axis] = (uint32_t)((int32_t)end[axis] + off);
+            says(end);
+            if (off >= -2 && off <= 2) {
+                expect_state(DR_GUARD_IDLE);
+                expect_cr();
+            } else {
+                run_us(100000);
+                says(end);
+                expect_fault(DR_FAULT_WRONG_END);
+                expect_silence();
+            }
+        }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_reading_may_be_500_um_beyond_the_travel);
+    RUN_TEST(beyond_the_travel_of_the_drive_that_speaks);
+    RUN_TEST(two_readings_agree_within_2_microsteps);
+    RUN_TEST(with_knobs_locked_the_tip_stays_within_20_um);
+    RUN_TEST(a_knob_may_have_moved_it_by_5_mm_a_second_and_for_20_s);
+    RUN_TEST(a_motion_ends_within_2_microsteps_of_its_target);
+    return UNITY_END();
+}
