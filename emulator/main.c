@@ -24,6 +24,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -320,6 +321,7 @@ static bool open_lint(program *p)
     if (!p->o->lints)
         return true;
     lint_open(&p->lint);
+    p->lint.clock_jumps = p->o->clock == CLOCK_JUMP;
     for (unsigned i = 0; i < p->e.station_count; i++) {
         p->lint_links[i].who = &p->lint.base;
         station_observe(&p->e.stations[i], &p->lint_links[i]);
@@ -420,15 +422,15 @@ static bool start_command(program *p)
     return p->child > 0;
 }
 
-/* The panel ends with the control channel. One that was killed has left the terminal as it was drawn on. */
-static void end_panel(program *p)
+/* `quit` ends the controllers; the command goes on without them, and its end is ours. The panel ends with the control channel;
+ * one that was killed has left the terminal as it was drawn on. */
+static void await_command(program *p)
 {
-    while (p->child > 0 && !child_has_ended(p->child, &p->status)) {
-        const struct timespec moment = {0, 10000000};
-        (void)nanosleep(&moment, NULL);
-    }
-    p->child = 0;
-    if (p->status > 128)
+    struct pollfd signals = {.fd = p->signal_fd, .events = POLLIN};
+    while (p->child > 0)
+        if (poll(&signals, 1, -1) > 0)
+            on_signal(&p->signals, 0);
+    if (p->o->task == TASK_PANEL && p->status > 128)
         terminal_restore(&p->terminal);
 }
 
@@ -497,12 +499,11 @@ static int run(program *p)
         start_and_run(p);
         tell_seed(p);
         desk_close(&p->desk);
-        if (p->o->task == TASK_PANEL)
-            end_panel(p);
         close_kept(p);
         engine_close(&p->e);
         trace_close(&p->trace);
         recorder_close(&p->recorder);
+        await_command(p);
         report_lint(p);
     } else {
         (void)fprintf(stderr, "dryrig-emu: %s\n", why);

@@ -446,5 +446,5 @@ const verb verbs_rig[] = {
     {"quirk", "NAME on|off", "behave as some real controllers do", true, do_quirk},
     {"trace", "on | off", "go on, or pause, with --trace", false, do_trace},
     {"subscribe", "", "a JSON line for everything that happens, from now on", false, do_subscribe},
-    {"quit", "", "end the emulator", false, do_quit},
+    {"quit", "", "end the emulator; the command of `run` goes on without it", false, do_quit},
     {NULL, NULL, NULL, false, NULL}};

@@ -75,6 +75,30 @@ class Run(unittest.TestCase):
             process.communicate(timeout=emu.LIMIT_S)
             self.assertEqual(process.returncode, status)
 
+    def test_quit_is_the_controllers_end_and_not_the_commands(self):
+        """Otherwise a test suite that says `quit` when it is done would pass, whatever comes of it."""
+        script = ('%s ctl "$DRYRIG_CONTROL" quit >/dev/null; while [ -e "$DRYRIG_PORT" ]; do sleep 0.01; done; '
+                  'trap "exit 6" TERM; echo gone; for i in $(seq 1000); do sleep 0.01; done')
+        for options in (), ("--strict", "--clock", "jump"):
+            process = subprocess.Popen([emu.PROGRAM, "run", *options, "mpc", "--", "sh", "-c", script % emu.PROGRAM],
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=self.environment)
+            self.assertEqual(process.stdout.readline(), b"gone\n")
+            self.assertIsNone(process.poll())
+            process.send_signal(signal.SIGTERM)  # passed on, as before
+            self.assertEqual(process.communicate(timeout=emu.LIMIT_S), (b"", b""))
+            self.assertEqual(process.returncode, 6)
+        self.assertEqual(self.run_("mpc", "--do", "quit", "--", "sh", "-c", "exit 6").returncode, 6)
+        done = self.run_("mpc", "--do", "on K quit", "--", "sh", "-c",
+                         'exec 3<>"$DRYRIG_PORT"; printf K >&3; cat <&3 >/dev/null 2>&1; exit 6')
+        self.assertEqual(done.returncode, 6)
+        self.assertEqual(self.processes(), [])
+
+    def test_a_port_that_hangs_up_is_seen_by_the_command(self):
+        host = ('import os\nport = os.open(os.environ["DRYRIG_PORT"], os.O_RDWR | os.O_NOCTTY)\n'
+                'os.system(sys_ctl)\ntry:\n    data = os.read(port, 1)\nexcept OSError:\n    data = b""\nos._exit(40 + len(data))')
+        host = f"sys_ctl = '{emu.PROGRAM} ctl $DRYRIG_CONTROL quit >/dev/null'\n" + host
+        self.assertEqual(self.run_("mpc", "--", sys.executable, "-c", host).returncode, 40)
+
     def test_the_command_has_the_signals_it_would_have_without(self):
         done = self.run_("mpc", "--", "cat", "/proc/self/status")
         lines = dict(line.split(":\t") for line in done.stdout.decode().splitlines() if ":\t" in line)
