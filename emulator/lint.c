@@ -305,7 +305,7 @@ static void judge_turn(lint *l, const lint_station *s, const observation *seen, 
 {
     const dr_controller *const c = &s->ins->controller;
     const char *const before = dr_words_command(s->last)->name;
-    if (s->is_excused || s->command_ns == 0)
+    if (s->is_excused || s->stopped_late || s->command_ns == 0)
         return;
     const uint64_t waited_us = us_between(s->command_ns, s->began_ns);
     const bool follows_position = s->last == DR_OP_TRIO_POSITION || s->last == DR_OP_MPC_POSITION;
@@ -336,12 +336,35 @@ static void judge_turn(lint *l, const lint_station *s, const observation *seen, 
              (unsigned long long)pause_us / 1000u, (unsigned long long)pause_us / 100u % 10u, before);
 }
 
+static bool moves(const lint_station *s, dr_op op)
+{
+    dr_command command;
+    return dr_command_for(s->kind, s->ins->controller.firmware, op, &command) && (command.is & DR_IS_MOTION) != 0;
+}
+
+/* Where the clock jumps, a move ends before a host can stop it: its CR is there, and ^C gets another one. A host that reads
+ * one CR behind ^C, as the manuals say, is one byte off from then on, until it has read everything. */
+static void look_for_late_stop(lint *l, lint_station *s, bool is_interrupt, bool was_owed)
+{
+    const bool is_behind = s->unread > 0 || s->read_behind; /* a quick one has read by now what it had left */
+    if (!is_interrupt && s->stopped_late) {
+        s->stopped_late = is_behind;
+        l->late_stops += s->stopped_late && !s->told_late_stop ? 1u : 0u;
+        s->told_late_stop = true;
+    } else if (is_interrupt && l->clock_jumps && !was_owed && is_behind && !s->stopped_late && moves(s, s->last)) {
+        s->stopped_late = true;
+        s->told_late_stop = false;
+    }
+}
+
 static void command_written(lint *l, lint_station *s, const observation *seen, const dr_command *command)
 {
     const uint8_t *const bytes = s->framer.bytes;
     const size_t count = 1u + (size_t)command->args;
     const bool was_owed = is_owed(s);
-    if ((command->is & DR_IS_INTERRUPT) == 0) {
+    const bool is_interrupt = (command->is & DR_IS_INTERRUPT) != 0;
+    look_for_late_stop(l, s, is_interrupt, was_owed);
+    if (!is_interrupt) {
         judge_turn(l, s, seen, command, bytes, count, was_owed);
         judge_contents(l, s, seen, command, bytes, count, was_owed);
     }
@@ -447,7 +470,7 @@ static void note_made(lint_station *s, const dr_note *note)
     case DR_NOTE_POWER_OFF:
         dr_framer_reset(&s->framer);
         s->in_flight = 0;
-        s->said_streaming = s->told_streaming = false;
+        s->said_streaming = s->told_streaming = s->stopped_late = false;
         s->is_excused = true;
         break;
     default:
@@ -464,7 +487,11 @@ static void port_left(lint *l, lint_station *s, const observation *seen)
     const bool has_spoken = s->command_ns != 0;
     const char *const before = dr_words_command(s->last)->name;
     s->command_ns = 0;
-    if (!has_spoken || s->is_excused || is_deaf(&s->ins->controller))
+    const bool stopped_late = s->stopped_late;
+    s->stopped_late = false;
+    if (stopped_late && seen->unread > 0 && !s->told_late_stop)
+        l->late_stops++;
+    if (!has_spoken || s->is_excused || stopped_late || is_deaf(&s->ins->controller))
         return;
     if (seen->unread == 1 && (s->last == DR_OP_TRIO_POSITION || s->last == DR_OP_MPC_POSITION))
         find(l, s, seen, LINT_THIRTEEN_BYTES, NULL, 0, "the port was closed with 1 byte of the position unread");
@@ -527,7 +554,7 @@ static void see(observer *o, const observation *seen)
     case OBSERVED_OPENED:
         s->is_open = true;
         s->command_ns = 0;
-        s->said_streaming = s->told_streaming = false;
+        s->said_streaming = s->told_streaming = s->stopped_late = false;
         break;
     case OBSERVED_CLOSED:
     case OBSERVED_END:

@@ -65,6 +65,13 @@ bool lint_report_text(const lint *l, FILE *file)
     unsigned rules = 0;
     for (unsigned i = 0; i < LINT_RULES; i++)
         rules += l->counts[i] > 0 ? 1 : 0;
+    if (l->late_stops > 0)
+        (void)fprintf(
+            file,
+            "dryrig-emu: --clock jump ends a move before ^C can stop it. %lu time%s the host read one CR where there "
+            "were two, the move's and ^C's, and was a byte behind from then on, which is not judged. Use --clock "
+            "step or real where programs stop moves.\n",
+            l->late_stops, plural(l->late_stops));
     if (total == 0)
         return true;
     (void)fprintf(file,

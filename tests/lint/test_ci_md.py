@@ -1,6 +1,7 @@
 """docs/ci.md is true: every recipe in it is carried out, but for MATLAB's, and what servers alone can do.
 
 The programs that it speaks of: my-tests, which does as $TESTS says; the tests in docs/ci-example."""
+import json
 import os
 import re
 import shutil
@@ -19,6 +20,11 @@ MY_TESTS = f"""#!/bin/sh
 case $TESTS in
 right) sleep 0.01; exec 3<>"$DRYRIG_PORT"; printf '\\003' >&3; head -c 1 <&3 >/dev/null ;;
 hasty) exec 3<>"$DRYRIG_PORT"; printf '\\101\\055\\101\\055' >&3; head -c 2 <&3 >/dev/null ;;
+stopping)
+    sleep 0.01; exec 3<>"$DRYRIG_PORT"
+    printf 'M\\000\\175\\000\\000\\000\\175\\000\\000\\000\\175\\000\\000' >&3
+    dryrig-emu ctl "$DRYRIG_CONTROL" advance 250ms
+    printf '\\003' >&3; head -c 1 <&3 >/dev/null; dryrig-emu ctl "$DRYRIG_CONTROL" state ;;
 *) exit "$TESTS" ;;
 esac
 """
@@ -72,6 +78,15 @@ class Recipes(unittest.TestCase):
         status, _, err = self.shell(line.replace("mpc --device MP-225", "trio"), TESTS="hasty")
         self.assertEqual(3, status)
         self.assertIn("early-command", err)
+
+    def test_a_move_is_stopped(self):
+        line = blocks("sh", "Programs that stop moves")[0]
+        status, out, err = self.shell(line, TESTS="stopping")
+        self.assertEqual((0, ""), (status, err))
+        state = json.loads(out.splitlines()[1])
+        self.assertEqual(250000, state["now_us"])
+        for steps in state["controllers"][0]["devices"][0]["position_steps"]:
+            self.assertTrue(0 < steps < 32000, steps)
 
     def test_what_it_finds(self):
         for line in blocks("sh", "What it finds that a fake port does not"):

@@ -306,6 +306,98 @@ static void who_gives_up_and_interrupts_has_done_right(void)
     found_nothing();
 }
 
+/* M, and ^C when its CR is already there; then one CR is read, as behind a move that ^C has stopped. */
+static void stop_a_move_that_is_over(bool clock_jumps)
+{
+    start(DR_MPC);
+    l.clock_jumps = clock_jumps;
+    say_move("M", 16000, 0, 0);
+    bench_wait_us(&b, 333334);
+    TEST_ASSERT_EQUAL(1, b.unread);
+    bench_sleep_real_us(&b, 100000);
+    bench_say(&b, "\x03", 1);
+    TEST_ASSERT_EQUAL(2, b.unread);
+    bench_read(&b, 1);
+}
+
+static void ask_for_one_byte_behind(const char *text)
+{
+    bench_wait_us(&b, 3000);
+    bench_say(&b, text, strlen(text));
+    bench_read(&b, b.unread - 1u);
+}
+
+static void a_stop_that_a_jumping_clock_makes_late_is_not_the_hosts_fault(void)
+{
+    stop_a_move_that_is_over(true);
+    ask_for_one_byte_behind("C");
+    ask_for_one_byte_behind("K");
+    bench_tell(&b, OBSERVED_CLOSED);
+    found_nothing();
+    TEST_ASSERT_EQUAL(1, l.late_stops);
+}
+
+/* It reads so soon that nothing is left by the time one looks. */
+static void a_late_stop_of_a_quick_host(void)
+{
+    start(DR_MPC);
+    l.clock_jumps = true;
+    say_move("M", 16000, 0, 0);
+    bench_wait_us(&b, 333334);
+    bench_read(&b, 1);
+    b.has_read_behind = true;
+    bench_say(&b, "\x03", 1);
+    bench_wait_us(&b, 3000);
+    bench_read(&b, 1);
+    b.has_read_behind = true;
+    bench_say(&b, "C", 1);
+    bench_read(&b, 13);
+    bench_tell(&b, OBSERVED_CLOSED);
+    found_nothing();
+    TEST_ASSERT_EQUAL(1, l.late_stops);
+}
+
+static void a_late_stop_excuses_until_all_is_read(void)
+{
+    stop_a_move_that_is_over(true);
+    bench_read(&b, ALL); /* it knows of the second CR */
+    ask_for_one_byte_behind("C");
+    bench_wait_us(&b, 3000);
+    bench_say(&b, "K", 1);
+    found(LINT_THIRTEEN_BYTES, 1);
+    TEST_ASSERT_EQUAL(0, l.late_stops);
+}
+
+static void a_late_stop_excuses_for_one_opening(void)
+{
+    stop_a_move_that_is_over(true);
+    bench_tell(&b, OBSERVED_CLOSED);
+    TEST_ASSERT_EQUAL(1, l.late_stops);
+    bench_tell(&b, OBSERVED_OPENED);
+    ask_for_one_byte_behind("C");
+    bench_tell(&b, OBSERVED_CLOSED);
+    found(LINT_THIRTEEN_BYTES, 1);
+}
+
+static void a_late_stop_is_the_hosts_where_time_goes(void)
+{
+    stop_a_move_that_is_over(false);
+    ask_for_one_byte_behind("C");
+    found(LINT_UNREAD_REPLY, 1);
+}
+
+static void a_stop_behind_a_query_that_was_left_unread_excuses_nothing(void)
+{
+    start(DR_MPC);
+    l.clock_jumps = true;
+    bench_say(&b, "K", 1);
+    bench_wait_us(&b, 3000);
+    bench_say(&b, "\x03", 1);
+    bench_read(&b, 1);
+    ask_for_one_byte_behind("C");
+    found(LINT_UNREAD_REPLY, 1);
+}
+
 static void a_cr_that_is_not_read_is_left(void)
 {
     start(DR_MPC);
@@ -790,6 +882,12 @@ int main(void)
     RUN_TEST(beyond_the_travel_both_ways_round_is_not_swapped);
     RUN_TEST(who_waits_and_gives_up_too_early_has_a_short_time_limit);
     RUN_TEST(who_gives_up_and_interrupts_has_done_right);
+    RUN_TEST(a_stop_that_a_jumping_clock_makes_late_is_not_the_hosts_fault);
+    RUN_TEST(a_late_stop_of_a_quick_host);
+    RUN_TEST(a_late_stop_excuses_until_all_is_read);
+    RUN_TEST(a_late_stop_excuses_for_one_opening);
+    RUN_TEST(a_late_stop_is_the_hosts_where_time_goes);
+    RUN_TEST(a_stop_behind_a_query_that_was_left_unread_excuses_nothing);
     RUN_TEST(a_cr_that_is_not_read_is_left);
     RUN_TEST(closing_with_an_answer_in_the_port_leaves_it);
     RUN_TEST(closing_before_the_answer_leaves_it);

@@ -94,6 +94,17 @@ class Lint(unittest.TestCase):
         self.assertEqual("", emulator("run", "mpc", "--lint=off", "--", "sh", "-c", "exit 0")[2])
         self.assertEqual(2, emulator("mpc", "--strict")[0])
 
+    def test_a_stop_that_a_jumping_clock_makes_late(self):
+        """A correct program: M, ^C 50 ms later, one CR, and on. Where time goes the move is stopped, and all is well."""
+        program = ("import os, serial, time\np = serial.Serial(os.environ['DRYRIG_PORT'], 128000, timeout=5)\n"
+                   "def ask(data, count):\n    time.sleep(0.003)\n    p.write(data)\n    p.read(count)\n"
+                   "time.sleep(0.003)\np.write(b'M' + bytes([0, 125, 0, 0] * 3))\ntime.sleep(0.05)\n"
+                   "ask(b'\\x03', 1)\nask(b'C', 14)\nask(b'U', 6)\nask(b'K', 4)\n")
+        for options, wanted in (((), ""), (("--clock", "jump"), "--clock jump ends a move before ^C can stop it. 1 time ")):
+            status, _, err = emulator("run", "mpc", *options, "--strict", "--", sys.executable, "-c", program)
+            self.assertEqual((0, wanted == ""), (status, err == ""), err)
+            self.assertIn(wanted, err)
+
     def test_a_baud_rate_that_the_controller_does_not_have(self):
         program = "import os, serial; p = serial.Serial(os.environ['DRYRIG_PORT'], {}); p.write(b'c'); p.read(14)"
         for baud, wanted in ((9600, True), (57600, False)):
