@@ -444,6 +444,8 @@ def main():
             results[index] = (module, mutant, fate)
             if fate != 'survived' or not arguments.quick:
                 memory.keep(module, mutant, fate, by)
+            if fate == 'survived' and mutant.key not in equivalents:
+                print('survived, ' + f'line {mutant.line}: ' + as_text(mutant), flush=True)
             if time.monotonic() - last > 60:
                 last = time.monotonic()
                 print(f'{count + 1} of {len(tasks)} after {last - began:.0f} s', flush=True)
@@ -459,8 +461,6 @@ def judge(arguments, results, equivalents, wrong):
             wrong.append(f'is {fate}: {" | ".join(mutant.key)}')
     survived = [mutant for _, mutant, fate in results if fate == 'survived']
     left = [mutant for mutant in survived if mutant.key not in equivalents]
-    for mutant in left:
-        print('survived, ' + f'line {mutant.line}: ' + as_text(mutant))
     found = sum(counts.get(fate, 0) for fate in FOUND)
     tried, unargued = found + len(survived), found + len(left)
     if counts.get('untested') or tried == 0:

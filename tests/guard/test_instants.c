@@ -345,6 +345,64 @@ static void tokens_for_motions_come_back_every_50_ms(void)
     TEST_ASSERT_EQUAL(0, rig.guard.running >> DR_TIMER_RATE & 1);
 }
 
+/* -- Stops in the middle of something ------------------------------------------------------------------------------------- */
+
+static void what_is_left_of_a_reading_is_no_answer_to_ctrl_c(void)
+{
+    armed();
+    host_line(15, 48000, 40000, 40000);
+    run_us(2000);
+    device_says("abcde", 5);
+    host_code(3);
+    device_says("\r\r\r\r\r\r\r\r\r", 9);
+    TEST_ASSERT_EQUAL(0, rig.guard.stop_crs);
+    run_us(400000); /* and no CR of ^C: asked for three times */
+    TEST_ASSERT_EQUAL(3, wire_stops());
+    says_at(40000);
+    run_us(100000);
+    says_at(40000);
+    expect_state(DR_GUARD_IDLE);
+    expect_silence();
+    proved(); /* of the host's own query as well */
+    host_code('c');
+    run_us(500);
+    device_says("abc", 3);
+    stop_input(true);
+    device_says("\r\r\r\r\r\r\r\r\r\r\r", 11);
+    TEST_ASSERT_EQUAL(0, rig.guard.stop_crs);
+    device_says("\r", 1);
+    TEST_ASSERT_EQUAL(1, rig.guard.stop_crs);
+}
+
+static void a_stop_while_the_end_is_verified_keeps_the_target_possible(void)
+{
+    moving_to(48000, 15);
+    device_says("\r", 1);
+    host_code(3);
+    device_says("\r", 1);
+    run_us(100000);
+    says_at(47000);
+    run_us(100000);
+    says_at(47000);
+    expect_state(DR_GUARD_IDLE);
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open);
+    TEST_ASSERT_EQUAL(48000 * 8, rig.guard.scene.old[0].target_q.min_q[DR_X]);
+    TEST_ASSERT_EQUAL(47000, rig.guard.scene.old[0].at_steps[DR_X]);
+    expect_cr();
+}
+
+static void fifteen_ctrl_c_running_are_passed_on_and_no_more(void)
+{
+    moving_to(48000, 15);
+    run_us(100000);
+    for (unsigned i = 0; i < 20; i++) {
+        host_code(3);
+        run_us(200);
+    }
+    TEST_ASSERT_EQUAL(15, wire_stops());
+    TEST_ASSERT_EQUAL(5, status().dropped_bytes);
+}
+
 static void noise_is_counted_by_the_second(void)
 {
     proved();
@@ -433,6 +491,9 @@ int main(void)
     RUN_TEST(idleness_disarms_and_does_nothing_to_a_fault);
     RUN_TEST(a_motion_that_cannot_be_stopped_is_one_from_its_first_byte);
     RUN_TEST(tokens_for_motions_come_back_every_50_ms);
+    RUN_TEST(what_is_left_of_a_reading_is_no_answer_to_ctrl_c);
+    RUN_TEST(a_stop_while_the_end_is_verified_keeps_the_target_possible);
+    RUN_TEST(fifteen_ctrl_c_running_are_passed_on_and_no_more);
     RUN_TEST(noise_is_counted_by_the_second);
     RUN_TEST(stop_contacts_may_disagree_for_50_ms_and_bounce_for_20_ms);
     RUN_TEST(one_call_does_sixteen_things_that_are_due);

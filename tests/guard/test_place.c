@@ -182,6 +182,73 @@ static void a_motion_ends_within_2_microsteps_of_its_target(void)
         }
 }
 
+static void knobs_that_are_locked_stay_locked_however_long_it_takes(void)
+{
+    armed_with(DR_RIG_KNOBS_LOCKED);
+    run_us(60000000);
+    read_before_a_motion(DR_Z, 40000 + 161);
+    expect_fault(DR_FAULT_POSITION_JUMP);
+}
+
+/* Both drives of an MPC-200, the second with 3 quanta a microstep: 426 of them are 1,278 quanta, 20 um are 1,280. */
+static void each_drive_is_held_against_its_own_place(void)
+{
+    for (uint32_t jump = 426; jump <= 427; jump++) {
+        bench_mpc();
+        rig.by_hand = true;
+        TEST_ASSERT_TRUE(dr_limits_init_drive(&rig.limits, 1, DR_STAGE_MPC_MP845));
+        bench_start();
+        run_us(1000000);
+        mpc_says(2, DR_X, 80000);
+        input(DR_INPUT_KEY, true);
+        press(DR_INPUT_ARM);
+        run_us(2000);
+        mpc_says(2, DR_X, 80000);
+        run_us(100000);
+        mpc_says(2, DR_X, 80000);
+        expect_state(DR_GUARD_IDLE);
+        host_point('M', 80000, 80100, 80000);
+        run_us(2000);
+        mpc_says(2, DR_Z, 80000 + jump);
+        expect_fault(jump == 426 ? DR_FAULT_NONE : DR_FAULT_POSITION_JUMP);
+        expect_state(jump == 426 ? DR_GUARD_CHECKING : DR_GUARD_FAULT);
+    }
+    bench_mpc(); /* another drive, chosen by hand, is anywhere: no jump, but not the one that the host meant */
+    rig.by_hand = true;
+    bench_start();
+    run_us(1000000);
+    mpc_says(1, DR_X, 80000);
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    mpc_says(1, DR_X, 80000);
+    run_us(100000);
+    mpc_says(1, DR_X, 80000);
+    host_point('M', 80000, 80100, 80000);
+    run_us(2000);
+    mpc_says(2, DR_X, 90000);
+    expect_fault(DR_FAULT_NONE);
+    expect_refused(DR_REASON_DRIVE);
+}
+
+/* Read as an MPC-200's, the lowest byte of Y is the highest of X, and so on; beyond 2^24 microsteps no MPC-200 goes. */
+static void a_trio_at_0_degrees_is_no_mpc_where_an_axis_would_be_too_long(void)
+{
+    static const struct {
+        uint32_t y, z;
+        uint8_t angle;
+        dr_guard_state state;
+    } readings[] = {{0, 0, 0, DR_GUARD_LOCKED},
+                    {1, 0, 0, DR_GUARD_DISARMED},
+                    {0, 1, 0, DR_GUARD_DISARMED},
+                    {0, 0, 1, DR_GUARD_DISARMED}};
+    for (size_t i = 0; i < sizeof readings / sizeof readings[0]; i++) {
+        begun();
+        device_at(1, readings[i].y, readings[i].z, readings[i].angle);
+        expect_state(readings[i].state);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -191,5 +258,8 @@ int main(void)
     RUN_TEST(with_knobs_locked_the_tip_stays_within_20_um);
     RUN_TEST(a_knob_may_have_moved_it_by_5_mm_a_second_and_for_20_s);
     RUN_TEST(a_motion_ends_within_2_microsteps_of_its_target);
+    RUN_TEST(knobs_that_are_locked_stay_locked_however_long_it_takes);
+    RUN_TEST(each_drive_is_held_against_its_own_place);
+    RUN_TEST(a_trio_at_0_degrees_is_no_mpc_where_an_axis_would_be_too_long);
     return UNITY_END();
 }
