@@ -20,7 +20,8 @@ contents of what was compiled and run: what did not change is not run again.
   --again    only what the run before did not kill
   --quick    without sanitizers and the longest tests: a first look, of which nothing is kept but kills
 
-Exit: 0 at least 97 % of what is left without the argued ones are found, and the list holds; 1 not; 2 nothing was measured:
+Exit: 0 at least 97 % of what is left without the argued ones are found (of a sample, which cannot tell 97 from 95: 90 %), and the
+list holds; 1 not; 2 nothing was measured:
 the tests fail without a mutant, or a program ended well without having run its tests.
 """
 import argparse
@@ -46,7 +47,7 @@ ROOT = HERE.parents[1]
 CORE = ROOT / 'firmware' / 'core'
 UNITY = ROOT / '.deps' / 'unity'
 MUTATED = ('dr_geometry', 'dr_limits', 'dr_judge', 'dr_log', 'dr_guard')
-GATE = 97
+GATE, GATE_OF_SAMPLE = 97, 90
 FLAGS = ['-std=c99', '-w', '-fPIC', f'-I{CORE}', f'-I{UNITY}', f'-I{HERE}']
 TCC = shutil.which('tcc') or 'gcc'  # ten times as fast as gcc; what it makes is half as fast: for tests that are swift
 SWIFT = 0.004  # seconds that a test takes: these come first
@@ -475,7 +476,8 @@ def judge(arguments, results, equivalents, wrong):
         print(f'mutate: equivalents.txt: {error}', file=sys.stderr)
     if arguments.report:
         report(arguments.report, results, equivalents, lines)
-    return 0 if found * 100 >= GATE * unargued and not wrong else 1
+    gate = GATE_OF_SAMPLE if arguments.sample else GATE
+    return 0 if found * 100 >= gate * unargued and not wrong else 1
 
 
 if __name__ == '__main__':
