@@ -2,7 +2,9 @@
 import json
 import os
 import resource
+import socket
 import subprocess
+import tempfile
 import threading
 import unittest
 
@@ -346,24 +348,32 @@ class Orders(unittest.TestCase):
                 channel.socket.sendall(b"tus\nstatus\n")
                 self.assertEqual([channel.answer()["ok"], channel.answer()["ok"]], [True, True])
 
-    def test_more_clients_than_places(self):
+    def test_a_stop_gets_in_where_every_place_is_taken(self):
         with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, _):
             channels = [Channel(g.socket) for _ in range(8)]
             for channel in channels:
                 self.assertEqual(channel.order("status")["ok"], True)
-            with Channel(g.socket) as ninth:
-                self.assertEqual(ninth.answer()["why"], "too many are connected")
-            channels.pop().close()
-            emu.wait_until(lambda: self.answers(g), "a free place")
+            self.assertEqual(guard.run("ctl", g.socket, "stop")[0], 0)
+            self.assertEqual(channels[0].answer()["why"], "too many are connected")
+            with self.assertRaises(AssertionError):
+                channels[0].answer()
+            for channel in channels[1:]:
+                self.assertIn(channel.order("status")["state"], ("stopping", "stopped"))
             for channel in channels:
                 channel.close()
 
-    @staticmethod
-    def answers(g):
-        try:
-            return g.status()["ok"]
-        except (AssertionError, OSError):
-            return False
+    def test_a_guard_that_hangs_up_is_told_of(self):
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "sock")
+            with socket.socket(socket.AF_UNIX) as deaf:
+                deaf.bind(path)
+                deaf.listen()
+                for _ in range(5):  # before or after the order was written
+                    hangs_up = threading.Thread(target=lambda: deaf.accept()[0].close())
+                    hangs_up.start()
+                    status, _, err = guard.run("ctl", path, "stop")
+                    hangs_up.join()
+                    self.assertEqual((status, "the guard does not answer" in err), (1, True), err)
 
     def test_the_program_gives_orders_too(self):
         with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, _):

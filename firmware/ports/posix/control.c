@@ -180,19 +180,24 @@ void control_watch(const control *c, struct pollfd *fds)
             (struct pollfd){c->clients[i].fd, (short)(POLLIN | (c->clients[i].out_count > 0 ? POLLOUT : 0)), 0};
 }
 
+/* Somebody may have come to say stop. Where every place is taken, who came first gives way. */
 static void take_in(control *c)
 {
+    static const char full[] = "{\"ok\":false,\"why\":\"too many are connected\"}";
     const int fd = accept4(c->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    for (unsigned i = 0; fd >= 0 && i < CONTROL_CLIENTS; i++)
-        if (c->clients[i].fd < 0) {
-            c->clients[i] = (control_client){.fd = fd};
-            return;
-        }
     if (fd < 0)
         return;
-    static const char full[] = "{\"ok\":false,\"why\":\"too many are connected\"}\n";
-    (void)send(fd, full, sizeof full - 1, MSG_NOSIGNAL | MSG_DONTWAIT);
-    (void)close(fd);
+    unsigned place = 0;
+    while (place < CONTROL_CLIENTS && c->clients[place].fd >= 0)
+        place++;
+    if (place == CONTROL_CLIENTS) {
+        place = c->gives_way;
+        c->gives_way = (place + 1u) % CONTROL_CLIENTS;
+        control_say(&c->clients[place], full);
+        if (c->clients[place].fd >= 0)
+            drop(&c->clients[place]);
+    }
+    c->clients[place] = (control_client){.fd = fd};
 }
 
 static void listen_to(control_client *who, void (*order)(void *, control_client *, const char *), void *context)

@@ -1,7 +1,8 @@
 /* control: the second channel of the guard, and of the emulator: a Unix socket that only its owner may use. A line of text
  * comes in, a line of JSON goes out.
  *
- * Nobody is waited for: a client that does not read is dropped when too much has gathered for it.
+ * Nobody is waited for: a client that does not read is dropped when too much has gathered for it. Nobody is kept out: where
+ * every place is taken, who came first is dropped.
  * Whose socket is it? One that answers belongs to a program that runs; one that nobody answers is left over and is replaced.
  * Thread-safety: one thread at a time per control. */
 #ifndef CONTROL_H
@@ -30,6 +31,7 @@ typedef struct {
     int fd;
     bool replaced; /* a socket was left over: its program was not ended in order */
     control_client clients[CONTROL_CLIENTS];
+    unsigned gives_way; /* whose place is taken next when all are */
 } control;
 
 /* path NULL: without. False: why[] says what is in the way; nothing was changed. */

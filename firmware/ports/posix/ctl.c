@@ -4,6 +4,7 @@
 #include <cjson/cJSON.h>
 
 #include <errno.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -139,6 +140,7 @@ int ctl_run(const char *path, const char *order, bool follows, bool is_json)
         return 1;
     }
     (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+    (void)signal(SIGPIPE, SIG_IGN); /* a guard that hangs up is to be told of, not to be died of */
     if (fprintf(guard, "%s\n", order) > 0 && fflush(guard) == 0)
         while (getline(&line, &room, guard) > 0) {
             status = tell(line, path, follows, is_json);
