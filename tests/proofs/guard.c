@@ -219,7 +219,9 @@ static void valid_timers(bool asserted)
     else
         HOLDS(g.tokens <= RATE_TOKENS && is_running(&g, DR_TIMER_RATE) == (g.tokens < RATE_TOKENS));
     if (g.task == TASK_CHECK)
-        HOLDS(g.tokens > 0);
+        HOLDS(g.tokens > 0 || g.counted);
+    if (g.task == TASK_SEND)
+        HOLDS(g.counted);
     if (is_running(&g, DR_TIMER_TASK))
         HOLDS((g.task == TASK_PROVE && g.read_phase == READ_OFF) || g.task == TASK_PASS || g.task == TASK_MOVE ||
               g.task == TASK_STOP);
@@ -271,6 +273,7 @@ static void any_guard(void)
     ANY(ambiguous), ANY(host_chose), ANY(confirmed), ANY(tip_changed), ANY(unsteady), ANY(wiring_alarm);
     ANY(stop_latched), ANY(cut), ANY(buzzer), ANY(resync), ANY(tainted), ANY(read_again), ANY(has_first);
     ANY(stop_broke_off), ANY(stop_waits), ANY(end_told), ANY(small), ANY(position_known), ANY(sealed);
+    ANY(counted);
     ANY(scene.may_calibrate), ANY(scene.in_tissue), ANY(scene.frame_lost);
     for (uint8_t drive = 0; drive < DR_PORTS; drive++)
         ANY(scene.old[drive].is_open);
@@ -382,7 +385,9 @@ void proof_pulled_byte(void)
     valid(true);
     assert(count == 0 || !before.torn);
     if (count == 0) {
-        assert(before.out_at == before.out_ready && (before.stops_out == 0 || was_leaving()));
+        assert(before.out_at == before.out_ready ||
+               (before.task == TASK_SEND && before.out_at == 0)); /* read for too long ago */
+        assert(before.stops_out == 0 || was_leaving());
     } else if (was_leaving()) {
         assert(byte == before.out[before.out_at] && g.out_at == before.out_at + 1u);
     } else if (before.stops_out > 0) {
