@@ -286,6 +286,12 @@ static bool do_help(telling *t)
 static bool cut(telling *t, char *line)
 {
     unsigned count = 0;
+    for (const char *at = line; *at != '\0'; at++)
+        if ((unsigned char)*at > 0x7Fu) { /* what is said about it would be no JSON, where it is no UTF-8 */
+            t->words[0] = at;
+            return telling_wrong(t, "byte %02X at character %u: commands are plain ASCII", (unsigned)(unsigned char)*at,
+                                 (unsigned)(at - line) + 1u);
+        }
     for (char *rest, *word = strtok_r(line, " \t\r\n", &rest); word != NULL; word = strtok_r(NULL, " \t\r\n", &rest)) {
         if (count == LANGUAGE_WORDS)
             return telling_wrong(t, "more than %u words", LANGUAGE_WORDS);

@@ -305,6 +305,34 @@ class Channel(unittest.TestCase):
             self.assertEqual((status, out), (1, ""))
             self.assertIn("--control", error)
 
+    def test_an_answer_is_json_whatever_was_said(self):
+        with Rehearsal("mpc") as e, socket.socket(socket.AF_UNIX) as channel:
+            channel.settimeout(emu.LIMIT_S)
+            channel.connect(e.socket_path)
+            lines = channel.makefile("rb")
+            for said in (b"\xff", b"power \xe9t\xe9", b"fault drop-\xc3\xa9", b"@\xfc state", b"x" * 480 + b"\xc3\xa9\xc3"):
+                channel.sendall(said + b"\n")
+                answer = json.loads(lines.readline().decode("utf-8"))
+                self.assertFalse(answer["ok"])
+                self.assertIn("ASCII", answer["why"])
+            channel.sendall(b"\x01\x7f\x1b[31m\n")
+            self.assertIn("\x1b[31m", json.loads(lines.readline().decode("utf-8"))["why"])
+            lines.close()
+
+    def test_the_longest_line(self):
+        """As dryrig-control(7) has it."""
+        with Rehearsal("mpc") as e:
+            self.assertTrue(e.say("state" + " " * 505)["ok"])
+
+    def test_a_time_that_has_gone_by(self):
+        with Rehearsal("mpc", "--clock", "step") as e:
+            e.do("advance 5s")
+            for until in ("4s", "5s"):
+                self.assertIn("the clock shows 5.000000 s already", e.refuses(f"fault drop-cr until {until}"))
+            e.do("fault drop-cr until 5.000001s")
+            e.do("at 2s power off")  # at once
+            self.assertEqual(e.controller()["state"], "off")
+
     def test_quit_ends_it(self):
         with Rehearsal("mpc") as e:
             self.assertEqual(e.say("quit"), {"ok": True})

@@ -115,6 +115,9 @@ class Wrong(Files):
         self.refused("advance 2s", 11, "--clock")
         self.refused("@other power off", 1, "no controller 'other'")
         self.refused("subscribe me", 11, "too many")
+        self.refused("fault drop-cr from 1s until 0.5s", 29, "'0.5s'", "can never strike")
+        self.refused("fault drop-cr until 1s from 1s on K", 29, "'1s'", "can never strike")
+        self.refused("power d\u00e9j\u00e0", 8, "byte C3", "ASCII")
         self.refused("set position " + "1" * 600, 512, "longer than 511")
 
     def test_a_file_that_is_none(self):
