@@ -18,12 +18,30 @@ typedef struct {
     bool is_paced_by_default;
 } reading;
 
+#define VALUE_MAX 256u /* a longer one is looked for by its beginning */
+
 /* -- What is wrong, and where --------------------------------------------------------------------------------------------- */
 
-__attribute__((format(printf, 4, 5))) static bool wrong(const reading *r, unsigned line, const char *word,
+static unsigned column_of(const reading *r, unsigned line, const char *word)
+{
+    return textfile_column(r->text, line, word);
+}
+
+/* A value is looked for with its quotation marks: "a" is no part of `name`. */
+static unsigned column_of_value(const reading *r, unsigned line, const char *value)
+{
+    char quoted[VALUE_MAX];
+    if (value == NULL || *value == '\0')
+        return column_of(r, line, value);
+    (void)snprintf(quoted, sizeof quoted, "\"%s\"", value);
+    const unsigned column = column_of(r, line, quoted);
+    return column == column_of(r, line, NULL) ? column_of(r, line, value) : column + 1u;
+}
+
+__attribute__((format(printf, 4, 5))) static bool wrong(const reading *r, unsigned line, unsigned column,
                                                         const char *format, ...)
 {
-    const int length = snprintf(r->why, r->room, "%s:%u:%u: ", r->path, line, textfile_column(r->text, line, word));
+    const int length = snprintf(r->why, r->room, "%s:%u:%u: ", r->path, line, column);
     va_list arguments;
     va_start(arguments, format);
     if (length >= 0 && (size_t)length < r->room)
@@ -35,8 +53,8 @@ __attribute__((format(printf, 4, 5))) static bool wrong(const reading *r, unsign
 static bool wrong_at(const reading *r, const config_setting_t *at, const char *what)
 {
     const char *const name = config_setting_name(at);
-    return wrong(r, config_setting_source_line(at), name, "%s%s%s", name == NULL ? "" : name, name == NULL ? "" : ": ",
-                 what);
+    const unsigned line = config_setting_source_line(at);
+    return wrong(r, line, column_of(r, line, name), "%s%s%s", name == NULL ? "" : name, name == NULL ? "" : ": ", what);
 }
 
 /* -- One controller ------------------------------------------------------------------------------------------------------ */
@@ -57,9 +75,11 @@ static bool read_list(const reading *r, const config_setting_t *from, const char
         const char *const text = config_setting_get_string_elem(from, i);
         if (text == NULL)
             return wrong_at(r, from, "expected texts in quotation marks");
-        if (*count == most)
-            return wrong(r, config_setting_source_line(from), config_setting_name(from),
-                         "%s: %u are too many, %u at most", config_setting_name(from), *count + 1u, most);
+        if (*count == most) {
+            const char *const name = config_setting_name(from);
+            const unsigned line = config_setting_source_line(from);
+            return wrong(r, line, column_of(r, line, name), "%s: %u are too many, %u at most", name, *count + 1u, most);
+        }
         texts[(*count)++] = text;
     }
     return true;
@@ -71,7 +91,7 @@ static bool note_places(const reading *r, const config_setting_t *entry, rig_mem
     const bool is_list = config_setting_is_aggregate(entry) == CONFIG_TRUE;
     for (unsigned i = 0; strcmp(config_setting_name(entry), "do") == 0 && i < member->do_count; i++) {
         member->do_line[i] = config_setting_source_line(is_list ? config_setting_get_elem(entry, i) : entry);
-        member->do_column[i] = textfile_column(r->text, member->do_line[i], member->do_[i]);
+        member->do_column[i] = column_of_value(r, member->do_line[i], member->do_[i]);
     }
     return true;
 }
@@ -125,6 +145,21 @@ static bool is_name(const char *name)
     return true;
 }
 
+static unsigned line_of(const config_setting_t *controller, const char *key)
+{
+    const config_setting_t *const at = config_setting_get_member(controller, key);
+    return config_setting_source_line(at == NULL ? controller : at);
+}
+
+/* Links and state files have one owner. */
+static bool is_its_own(const reading *r, const config_setting_t *from, const char *key, const char *path,
+                       const char *others_path, const char *other)
+{
+    const unsigned line = line_of(from, key);
+    return path == NULL || others_path == NULL || strcmp(path, others_path) != 0 ||
+           wrong(r, line, column_of_value(r, line, path), "%s %s: '%s' has it already", key, path, other);
+}
+
 static bool read_member(const reading *r, rig *so_far, const config_setting_t *from)
 {
     rig_member *const member = &so_far->members[so_far->count];
@@ -134,24 +169,32 @@ static bool read_member(const reading *r, rig *so_far, const config_setting_t *f
     const char *name = NULL;
     memset(&t, 0, sizeof t);
     if (config_setting_type(from) != CONFIG_TYPE_GROUP)
-        return wrong(r, line, NULL, "expected a controller: { name = \"left\"; controller = \"mpc\"; }");
+        return wrong(r, line, column_of(r, line, NULL),
+                     "expected a controller: { name = \"left\"; controller = \"mpc\"; }");
     for (int i = 0; i < config_setting_length(from); i++)
         if (!read_entry(r, config_setting_get_elem(from, (unsigned)i), member, &t, &name))
             return false;
     if (t.controller == NULL)
-        return wrong(r, line, NULL, "this one says not what it is: controller = \"trio\"; or \"mpc\"");
+        return wrong(r, line, column_of(r, line, NULL),
+                     "this one says not what it is: controller = \"trio\"; or \"mpc\"");
     if (name == NULL)
         name = t.controller;
+    const unsigned name_line = line_of(from, "name");
     if (!is_name(name))
         return wrong(
-            r, line, name,
+            r, name_line, column_of_value(r, name_line, name),
             "'%s' is no name: expected up to %u letters, digits and _, a letter first (a program finds the port "
             "in DRYRIG_PORT_<name>)",
             name, RIG_NAME_MAX - 1u);
     for (unsigned i = 0; i < so_far->count; i++)
         if (strcmp(name, so_far->members[i].name) == 0)
-            return wrong(r, line, name, "'%s' is the name of another one already", name);
+            return wrong(r, name_line, column_of_value(r, name_line, name), "'%s' is the name of another one already",
+                         name);
     (void)snprintf(member->name, sizeof member->name, "%s", name);
+    for (unsigned i = 0; i < so_far->count; i++)
+        if (!is_its_own(r, from, "link", member->link, so_far->members[i].link, so_far->members[i].name) ||
+            !is_its_own(r, from, "state", t.state, so_far->members[i].setup.state, so_far->members[i].name))
+            return false;
     if (setup_read(&t, r->is_paced_by_default, &member->setup, &problem)) {
         so_far->count++;
         return true;
@@ -165,7 +208,8 @@ static bool read_member(const reading *r, rig *so_far, const config_setting_t *f
     const config_setting_t *at = config_setting_get_member(from, key);
     if (at != NULL && config_setting_is_aggregate(at) && config_setting_get_elem(at, problem.index) != NULL)
         at = config_setting_get_elem(at, problem.index);
-    return wrong(r, at == NULL ? line : config_setting_source_line(at), problem.text, "%s %s: %s", problem.what,
+    const unsigned at_line = at == NULL ? line : config_setting_source_line(at);
+    return wrong(r, at_line, column_of_value(r, at_line, problem.text), "%s %s: %s", problem.what,
                  problem.text == NULL ? "" : problem.text, problem.why);
 }
 
@@ -179,17 +223,16 @@ static bool read_controllers(const reading *r, const config_t *config, rig *resu
         if (config_setting_get_elem(root, i) != list)
             return wrong_at(r, config_setting_get_elem(root, i), "there is no such entry; expected controllers");
     if (list == NULL)
-        return wrong(r, 1, NULL, "no controllers in it: expected controllers = ( { controller = \"mpc\"; } );");
+        return wrong(r, 1, 1, "no controllers in it: expected controllers = ( { controller = \"mpc\"; } );");
     if (config_setting_type(list) != CONFIG_TYPE_LIST || config_setting_length(list) == 0)
         return wrong_at(r, list, "expected a list: ( { ... }, { ... } )");
     const unsigned count = (unsigned)config_setting_length(list);
     if (count > RIG_MAX)
-        return wrong(r, config_setting_source_line(list), NULL, "%u controllers are too many, %u at most", count,
-                     RIG_MAX);
+        return wrong(r, config_setting_source_line(list), 1, "%u controllers are too many, %u at most", count, RIG_MAX);
     result->count = 0;
     result->members = calloc(count, sizeof *result->members);
     if (result->members == NULL)
-        return wrong(r, 1, NULL, "no memory");
+        return wrong(r, 1, 1, "no memory");
     for (unsigned i = 0; i < count; i++)
         if (!read_member(r, result, config_setting_get_elem(list, i)))
             return false;
@@ -206,10 +249,11 @@ bool rig_read(rig *result, const char *path, bool is_paced_by_default, char *why
         return false;
     }
     config_init(&config);
-    const bool done = config_read_string(&config, text) == CONFIG_TRUE
-                          ? read_controllers(&r, &config, result)
-                          : wrong(&r, (unsigned)config_error_line(&config), NULL,
-                                  "%s; 'man dryrig-emu' shows a rig file", config_error_text(&config));
+    const bool done =
+        config_read_string(&config, text) == CONFIG_TRUE
+            ? read_controllers(&r, &config, result)
+            : wrong(&r, (unsigned)config_error_line(&config), column_of(&r, (unsigned)config_error_line(&config), NULL),
+                    "%s; 'man dryrig-emu' shows a rig file", config_error_text(&config));
     free(text);
     return done;
 }

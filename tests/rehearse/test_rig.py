@@ -115,6 +115,21 @@ class Rig(unittest.TestCase):
         self.refused("speed = 1;\n", 1, 1, "speed")
         self.refused("controllers = ( );", 1, 1, "list")
 
+    def test_values_are_found_where_they_stand(self):
+        """And not within the words before them."""
+        one = "  {{ name = \"{}\"; controller = \"mpc\"; }}"
+        self.refused("controllers = (\n" + one.format("a") + ",\n" + one.format("a") + "\n);", 3, 13, "'a'", "already")
+        self.refused("controllers = (\n  { controller = \"mpc\";\n    name = \"1\"; }\n);", 3, 13, "'1'", "letters")
+        self.refused("controllers = (\n  { controller = \"trio\"; angle = \"t\"; }\n);", 2, 35, "angle t", "90")
+        self.refused("controllers = (\n  { controller = \"mpc\"; do = [ \"d\" ]; }\n);", 2, 33, "'d' is no verb")
+
+    def test_two_that_would_share_a_file(self):
+        for key in "link", "state":
+            path = os.path.join(self.directory, "shared")
+            self.refused(f"controllers = (\n  {{ name = \"l\"; controller = \"mpc\"; {key} = \"{path}\"; }},\n"
+                         f"  {{ name = \"r\"; controller = \"mpc\";\n    {key} = \"{path}\"; }}\n);", 4, len(key) + 9,
+                         key, path, "'l' has it already")
+
     def test_a_file_that_is_not_there(self):
         status, _, error = emu.outcome("rig", "check", self.path)
         self.assertEqual(status, 2)
