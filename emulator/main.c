@@ -31,6 +31,7 @@
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
+#include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -192,12 +193,15 @@ static bool say_ready(const program *p)
 
 /* -- The command of `run` ---------------------------------------------------------------------------------------------- */
 
-/* A directory of its own for links and socket: their paths stay when a plug is pulled and put in again. */
+/* A directory of its own for links and socket: their paths stay when a plug is pulled and put in again. TMPDIR may be too long
+ * for a socket. */
 static bool make_directory(program *p)
 {
+    static const char in_it[] = "/dryrig-XXXXXX/control";
     const char *const where = getenv("TMPDIR");
-    const int length = snprintf(p->directory, sizeof p->directory, "%s/dryrig-XXXXXX",
-                                where != NULL && *where == '/' ? where : "/tmp");
+    const bool will_do =
+        where != NULL && *where == '/' && strlen(where) + sizeof in_it <= sizeof((struct sockaddr_un *)NULL)->sun_path;
+    const int length = snprintf(p->directory, sizeof p->directory, "%s/dryrig-XXXXXX", will_do ? where : "/tmp");
     if (length >= 0 && (size_t)length < sizeof p->directory && mkdtemp(p->directory) != NULL)
         return true;
     p->directory[0] = '\0';

@@ -118,6 +118,20 @@ class Run(unittest.TestCase):
         self.assertEqual(done.stdout.decode().splitlines()[0], link)
         self.assertTrue(done.stdout.decode().splitlines()[1].startswith("/dev/pts/"))
 
+    def test_a_tmpdir_that_is_too_long_for_a_socket(self):
+        """Its path has 107 bytes at most; those of CI servers can be longer. /tmp will do."""
+        for length, is_short in ((85, True), (86, False), (200, False)):
+            where = os.path.join(self.directory, "d" * (length - len(self.directory) - 1))
+            os.mkdir(where)
+            self.environment["TMPDIR"] = where
+            done = self.run_("mpc", "--", "sh", "-c", 'dirname "$DRYRIG_CONTROL"; "$0" ctl "$DRYRIG_CONTROL" state >&2',
+                             emu.PROGRAM)
+            os.rmdir(where)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn(b'"ok":true', done.stderr)
+            self.assertEqual(os.path.dirname(done.stdout.decode()), where if is_short else "/tmp")
+            self.assertFalse(os.path.exists(done.stdout.decode().strip()))
+
     def test_several_at_once_do_not_disturb_each_other(self):
         def one(number):
             for _ in range(5):
