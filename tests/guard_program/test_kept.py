@@ -88,10 +88,13 @@ class Recording(unittest.TestCase):
                 file.write(rig(guard.MPC))
             base = ("--port", e.path, "--config", conf, "--link", directory + "/host")
             for more in (("--log", "/dev/null", "--record", self.path), ("--log", directory + "/log", "--record", "/dev/full"),
-                         ("--log", directory + "/log", "--record", directory)):
+                         ("--log", directory + "/log", "--record", directory),
+                         ("--record", self.path), ("--record", conf)):  # a slip must not cost a configuration or a log
                 status, out, err = guard.run(*base, *more)
                 self.assertEqual((status, out), (1, ""), err)
                 self.assertEqual(os.listdir(directory), ["rig.conf"])
+            self.assertEqual(read(conf), rig(guard.MPC))
+            self.assertIn("holds something else than a recording: it stays", err)
         self.assertEqual(read(self.path), "precious")
 
     def test_the_port_lost_and_found_is_told(self):
