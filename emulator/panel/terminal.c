@@ -14,10 +14,11 @@ static bool read_capabilities(void)
 
 bool terminal_is_known(void)
 {
-    const bool is_known = read_capabilities();
-    if (is_known)
-        (void)del_curterm(cur_term);
-    return is_known;
+    if (!read_capabilities())
+        return false;
+    const bool can_be_drawn_on = cursor_address != NULL; /* "dumb" is known too, and newterm() takes it */
+    (void)del_curterm(cur_term);
+    return can_be_drawn_on;
 }
 
 void terminal_keep(terminal *t) { t->is_kept = tcgetattr(STDIN_FILENO, &t->settings) == 0; }

@@ -12,7 +12,7 @@ typedef struct {
     struct termios settings;
 } terminal;
 
-/* Is there a terminal at stdout, of a kind that is known (TERM)? */
+/* Is there a terminal at stdout, of a kind that is known (TERM) and has a cursor that can be moved? */
 bool terminal_is_known(void);
 /* Keeps how the terminal at stdin is set. */
 void terminal_keep(terminal *t);

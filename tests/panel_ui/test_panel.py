@@ -413,8 +413,9 @@ class Ends(unittest.TestCase):
         self.assertIn(b"which emulator?", done.stderr)
 
     def test_a_terminal_that_nobody_knows(self):
-        with trio() as e, Terminal("env", "TERM=nobody-knows", PANEL, e.socket_path) as t:
-            self.assertIn("the terminal 'nobody-knows' cannot be drawn on", t.ended(2))
+        for term in "nobody-knows", "dumb":  # the second one cannot move its cursor
+            with trio() as e, Terminal("env", "TERM=" + term, PANEL, e.socket_path) as t:
+                self.assertIn(f"the terminal '{term}' cannot be drawn on", t.ended(2))
 
     def test_a_terminal_without_colours(self):
         with trio() as e, Terminal("env", "TERM=vt100", PANEL, e.socket_path) as t:
