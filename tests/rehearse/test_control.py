@@ -333,6 +333,24 @@ class Channel(unittest.TestCase):
             e.do("at 2s power off")  # at once
             self.assertEqual(e.controller()["state"], "off")
 
+    def test_a_ninth_connection_takes_the_place_of_the_first(self):
+        with Rehearsal("mpc") as e:
+            channels = []
+            for _ in range(8):
+                channels.append(socket.socket(socket.AF_UNIX))
+                self.addCleanup(channels[-1].close)
+                channels[-1].settimeout(emu.LIMIT_S)
+                channels[-1].connect(e.socket_path)
+                channels[-1].sendall(b"help quit\n")
+                self.assertTrue(json.loads(channels[-1].recv(4096))["ok"])
+            with e.lines as first:
+                self.assertEqual(json.loads(first.readline())["why"], "too many are connected")
+                self.assertEqual(first.readline(), "")
+            for channel in channels:
+                channel.sendall(b"state\n")
+                self.assertTrue(channel.recv(10).startswith(b'{"ok":true'))
+            self.assertEqual(ctl(e.socket_path, "state")[0], 0)
+
     def test_quit_ends_it(self):
         with Rehearsal("mpc") as e:
             self.assertEqual(e.say("quit"), {"ok": True})
