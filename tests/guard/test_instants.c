@@ -113,6 +113,33 @@ static void a_reply_may_pause_for_100_ms_and_is_asked_for_again_after_100_ms_of_
     due_in(100000);
 }
 
+static void each_reading_has_two_tries(void)
+{
+    proved();
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    for (unsigned reading = 0; reading < 2; reading++) {
+        device_says("nonsense......", 14);
+        expect_fault(DR_FAULT_NONE);
+        run_us(100000);
+        says_at(40000);
+        run_us(100000);
+    }
+    expect_state(DR_GUARD_IDLE);
+}
+
+static void a_motion_that_is_taken_back_leaves_nothing_due(void)
+{
+    armed();
+    host_line(15, 48000, 40000, 40000);
+    run_us(2000);
+    says_at(40000);
+    run_us(500);
+    host_code(3);
+    due_in(49500); /* but a token for motions */
+}
+
 static void a_byte_within_the_gap_before_a_query_begins_it_anew(void)
 {
     proved();
@@ -480,6 +507,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(a_silent_controller_is_asked_ten_times_in_pauses_that_grow);
     RUN_TEST(a_reply_may_pause_for_100_ms_and_is_asked_for_again_after_100_ms_of_quiet);
+    RUN_TEST(each_reading_has_two_tries);
+    RUN_TEST(a_motion_that_is_taken_back_leaves_nothing_due);
     RUN_TEST(a_byte_within_the_gap_before_a_query_begins_it_anew);
     RUN_TEST(a_frame_may_pause_for_100_ms_and_take_300_ms);
     RUN_TEST(a_motion_has_one_and_a_half_times_its_way_and_2_s);

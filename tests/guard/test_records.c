@@ -81,6 +81,8 @@ static void a_query_is_kept_with_its_reply(void)
     host_code('c');
     run_us(2000000);
     records(DR_EVENT_NO_REPLY, DR_OP_TRIO_POSITION, DR_OP_NONE, DR_AXES, DR_NO_ITEM, "", 0, 41000);
+    TEST_ASSERT_NULL(last_record(DR_EVENT_DROPPED));
+    TEST_ASSERT_NULL(last_record(DR_EVENT_QUARANTINED));
 }
 
 static void what_the_controller_says_unasked_is_kept(void)
@@ -148,6 +150,33 @@ static void a_motion_is_kept_with_its_readings_and_its_end(void)
     expect_cr();
 }
 
+/* What was allowed and taken back before it left was not forwarded; a refusal that follows takes nothing more back. */
+static void what_is_cancelled_before_it_leaves_was_not_forwarded(void)
+{
+    armed();
+    const uint32_t before = status().forwarded;
+    host_axis('x', 40802);
+    run_us(2000);
+    says_at(40002);
+    TEST_ASSERT_EQUAL(before + 1, status().forwarded);
+    host_code(3);
+    expect_refused(DR_REASON_CANCELLED);
+    TEST_ASSERT_EQUAL(before, status().forwarded);
+    run_us(500);
+    device_says("\r", 1);
+    run_us(100000);
+    says_at(40002);
+    run_us(100000);
+    says_at(40002);
+    expect_state(DR_GUARD_IDLE);
+    host_axis('x', 199999);
+    run_us(2000);
+    says_at(40002);
+    expect_refused(DR_REASON_LIMIT);
+    TEST_ASSERT_EQUAL(before, status().forwarded);
+    expect_cr();
+}
+
 /* 'E' tells that nothing will be done. Not while something else is, nor for what the host took back itself. */
 static void e_is_no_answer_to_what_came_while_moving_or_was_cancelled(void)
 {
@@ -181,6 +210,7 @@ int main(void)
     RUN_TEST(what_people_do_is_kept);
     RUN_TEST(refusals_are_kept_with_what_they_are_about);
     RUN_TEST(a_motion_is_kept_with_its_readings_and_its_end);
+    RUN_TEST(what_is_cancelled_before_it_leaves_was_not_forwarded);
     RUN_TEST(e_is_no_answer_to_what_came_while_moving_or_was_cancelled);
     return UNITY_END();
 }

@@ -1,0 +1,169 @@
+/* What is broken off, and what is remembered of it. The test is the controller. */
+#include "bench.h"
+
+#include <string.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static void trio_says(uint32_t x) { device_at(x, 40000, 40000, 30); }
+
+static void mpc_says(uint8_t drive, uint32_t x)
+{
+    const uint8_t reply[] = {
+        drive, (uint8_t)x, (uint8_t)(x >> 8), (uint8_t)(x >> 16), 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, DR_CR};
+    device_says(reply, sizeof reply);
+}
+
+static void says_home(void)
+{
+    if (rig.limits.kind == DR_TRIO)
+        trio_says(40000);
+    else
+        mpc_says(1, 80000);
+}
+
+static void armed(dr_kind kind, uint16_t facts)
+{
+    if (kind == DR_TRIO)
+        bench_trio();
+    else
+        bench_mpc();
+    rig.by_hand = true;
+    rig.limits.rig = (uint16_t)(DR_RIG_KNOBS_LOCKED | facts);
+    bench_start();
+    run_us(1000000);
+    says_home();
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    says_home();
+    run_us(100000);
+    says_home();
+    expect_state(DR_GUARD_IDLE);
+}
+
+static void rest_at(void (*says)(void))
+{
+    run_us(100000);
+    says();
+    run_us(100000);
+    says();
+}
+
+static void says_41000(void) { trio_says(41000); }
+static void says_81000(void) { mpc_says(1, 81000); }
+
+static void a_stop_within_a_line_keeps_its_target_possible(void)
+{
+    armed(DR_MPC, 0);
+    host_line(15, 84000, 80000, 80000);
+    run_us(2000);
+    says_home();
+    run_us(12000); /* in the pause behind the second byte */
+    host_code(3);
+    run_us(30000);
+    expect_state(DR_GUARD_STOPPING);
+    TEST_ASSERT_EQUAL(1, wire_stops());
+    device_says("\r", 1);
+    rest_at(says_81000);
+    expect_state(DR_GUARD_IDLE);
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open);
+    TEST_ASSERT_EQUAL(84000 * 4, rig.guard.scene.old[0].target_q.max_q[DR_X]);
+}
+
+static void a_stop_within_a_setting_breaks_no_motion_off(void)
+{
+    armed(DR_TRIO, 0);
+    host_value('A', 45); /* its first byte is on the line */
+    stop_input(true);
+    run_us(1000);
+    device_says("\r\r", 2);
+    rest_at(says_home);
+    expect_state(DR_GUARD_STOPPED);
+    TEST_ASSERT_FALSE(rig.guard.scene.old[0].is_open);
+}
+
+static void a_motion_that_cannot_be_stopped_and_is_late_is_looked_for(void)
+{
+    armed(DR_TRIO, 0);
+    host_axis('x', 40800); /* 100 um: 30 ms and 2 s */
+    run_us(2000);
+    says_home();
+    run_us(2050000);
+    expect_state(DR_GUARD_STOPPING);
+    TEST_ASSERT_FALSE(status().buzzer); /* nobody has asked for a stop */
+    run_us(400000);
+    says_41000();
+    run_us(100000);
+    says_41000();
+    expect_fault(DR_FAULT_NO_CR);
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open);
+    TEST_ASSERT_EQUAL(41000, rig.guard.scene.old[0].at_steps[DR_X]);
+}
+
+static void a_cable_pulled_in_a_stop_ends_it(void)
+{
+    armed(DR_TRIO, 0);
+    host_line(15, 48000, 40000, 40000);
+    run_us(2000);
+    says_home();
+    run_us(150000);
+    host_code(3);
+    run_us(1000);
+    cables(true, false);
+    expect_fault(DR_FAULT_NO_DEVICE);
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open);
+    TEST_ASSERT_FALSE(rig.guard.scene.frame_lost); /* that takes a calibration */
+    run_us(400000);
+    TEST_ASSERT_EQUAL(1, wire_stops()); /* repeated for nobody */
+    host_code('c');
+    expect_refused(DR_REASON_NOT_ARMED); /* there is nobody who has proved to be the controller */
+}
+
+static void the_end_of_another_drives_way_is_no_end(void)
+{
+    armed(DR_MPC, 0);
+    host_point('M', 84000, 80000, 80000);
+    run_us(2000);
+    says_home();
+    run_us(100000);
+    device_says("\r", 1);
+    run_us(2000);
+    mpc_says(2, 84000); /* somebody has chosen the other drive by hand; by chance it stands where the first should be */
+    run_us(100000);
+    mpc_says(2, 84000);
+    expect_fault(DR_FAULT_WRONG_END);
+    expect_silence();
+}
+
+/* ^C comes within a streamed position; the controller sends no more of it. */
+static void a_streamed_position_that_is_cut_off_swallows_no_cr(void)
+{
+    armed(DR_MPC, DR_RIG_MAY_STREAM);
+    host_line(15, 84000, 80000, 80000);
+    run_us(2000);
+    says_home();
+    run_us(100000);
+    expect_state(DR_GUARD_MOVING_S);
+    device_says("\xFF\xFF\xFF\x40", 4);
+    host_code(3);
+    run_us(1000);
+    device_says("\r", 1);
+    rest_at(says_81000);
+    expect_state(DR_GUARD_IDLE);
+    TEST_ASSERT_EQUAL(1, wire_stops());
+    expect_heard("\xFF\xFF\xFF\x40\r", 5);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_stop_within_a_line_keeps_its_target_possible);
+    RUN_TEST(a_stop_within_a_setting_breaks_no_motion_off);
+    RUN_TEST(a_motion_that_cannot_be_stopped_and_is_late_is_looked_for);
+    RUN_TEST(a_cable_pulled_in_a_stop_ends_it);
+    RUN_TEST(the_end_of_another_drives_way_is_no_end);
+    RUN_TEST(a_streamed_position_that_is_cut_off_swallows_no_cr);
+    return UNITY_END();
+}
