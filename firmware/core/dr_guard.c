@@ -98,12 +98,14 @@ static bool is_between_bytes(const dr_guard *g)
 
 static void end(dr_guard *g, dr_us now)
 {
+    if (g->torn && g->device_present) /* found now: to the guard it is as unplugged */
+        dr_g_link(g, now, g->host_open, g->plugged);
     dr_g_show_state(g, now);
     if (g->stops_out == 0 && is_between_bytes(g)) /* nor while a ^C waits to be pulled */
         dr_g_seal(g);
 }
 
-bool dr_guard_is_mid_frame(const dr_guard *g) { return is_leaving(g); }
+bool dr_guard_is_mid_frame(const dr_guard *g) { return g->torn || is_leaving(g); }
 
 bool dr_guard_due(const dr_guard *g, dr_us *when)
 {

@@ -58,8 +58,9 @@ typedef enum {
     DR_FAULT_STOP_WIRING,      /* the two stop contacts disagree for more than 50 ms */
     DR_FAULT_DAMAGED, /* limits or state in memory are not what they were (a flipped bit): restart the guard. Where it was the
                        * state, the log is no more */
-    DR_FAULT_TORN, /* locks: the cable went within a frame, whose rest the controller takes from any byte that
-                                * comes: cycle its power, then CONFIRM */
+    DR_FAULT_TORN, /* locks: the controller may hold half a frame, whose rest it takes from any byte that comes: the
+                    * cable or the guard went within one, or an MPC-200 has not answered 11 bytes. Cycle its power,
+                    * then CONFIRM */
     DR_FAULTS
 } dr_fault;
 
@@ -205,6 +206,7 @@ typedef struct {
     uint8_t out[DR_FRAME_MAX], out_at, out_count; /* to the device: one frame or query */
     uint8_t out_ready;                            /* how many bytes of it may leave by now */
     uint8_t stops_out;                            /* ^C that wait to leave */
+    uint8_t unanswered;                           /* bytes since its last, to an MPC-200 that is not proved */
     uint8_t to_host[DR_HOST_OUT_MAX], to_host_first, to_host_count;
 
     uint8_t stop_owed, stop_crs;  /* CRs that the host's own ^C may have; CRs that came */
@@ -253,9 +255,9 @@ void dr_guard_push_device(dr_guard *g, dr_us now, const uint8_t *bytes, size_t c
 /* Bytes that leave now; how many, 0 when there are none yet. */
 size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room);
 size_t dr_guard_pull_host(dr_guard *g, dr_us now, uint8_t *bytes, size_t room);
-/* A frame of more than one byte has been begun and not yet pulled to its end. Who may be reset at any moment asks after
- * each byte, before it goes to the line, and keeps the answer where a reset does not reach, until this says no and the
- * line has sent its last byte: for dr_guard_start(). */
+/* A frame of more than one byte has been begun and not yet pulled to its end, or DR_FAULT_TORN waits for CONFIRM. Who may
+ * be reset at any moment asks after each byte, before it goes to the line, and after each link or input; and keeps the
+ * answer where a reset does not reach, until this says no and the line has sent its last byte: for dr_guard_start(). */
 bool dr_guard_is_mid_frame(const dr_guard *g);
 /* When something will happen by itself (a byte that must wait before it can be pulled counts). False: never, as things
  * are. At that instant call any function with that `now`, dr_guard_pull_device() for one. */

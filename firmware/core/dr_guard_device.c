@@ -189,6 +189,7 @@ static void push_in_stop(dr_guard *g, dr_us now, uint8_t byte)
 void dr_g_push_device_byte(dr_guard *g, dr_us now, uint8_t byte)
 {
     const bool sent = g->out_at == g->out_count;
+    g->unanswered = 0;
     if (g->limits == NULL) {
         g->quarantined_bytes++;
         return;

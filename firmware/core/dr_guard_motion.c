@@ -23,8 +23,8 @@ dr_us dr_g_longest_us(const dr_guard *g)
     }
     const uint64_t speed = dr_judge_speed(g->limits, g->path_drive, line ? g->request.value : DR_SPEED_FULL, false);
     const uint64_t lasts_us = way_q * 3u * (DR_US_PER_S / 2u) / speed + MS(2000);
-    return (dr_us)
-        lasts_us; /* the longest: 87.5 mm in all (MP-865) at 81 um/s, 27 minutes; instants are told apart up to 35 */
+    /* The longest: 87.5 mm in all (MP-865) at 81 um/s, 27 minutes; instants are told apart up to 35. */
+    return (dr_us)lasts_us;
 }
 
 static bool is_small(const dr_guard *g)

@@ -1,7 +1,8 @@
 /* What goes out: to the host, to the controller; refusals. See dr_guard_rooms.h. */
 #include "dr_guard_rooms.h"
 
-#define RAW_STOPS_MAX 15u /* ^C that wait to leave */
+#define RAW_STOPS_MAX 15u  /* ^C that wait to leave */
+#define UNANSWERED_MAX 11u /* an MPC-200 that has the head of an 'S' waits for 12 bytes [M table 9] */
 
 /* What does not fit a host that does not read is lost, as on a wire; so is what comes when nobody is there. */
 void dr_g_put_host(dr_guard *g, uint8_t byte)
@@ -75,9 +76,23 @@ void dr_g_withdraw(dr_guard *g)
     clear_timer(g, DR_TIMER_SEND);
 }
 
+/* One byte more? An MPC-200 that is silent from the start may hold the head of an 'S', from a guard that lost its power
+ * within the pause: it must not get the rest, whoever asks for a ^C. Torn: end() does what follows. */
+static bool may_send(dr_guard *g)
+{
+    if (g->proved || g->limits == NULL || kind_of(g) != DR_MPC)
+        return true;
+    if (g->unanswered < UNANSWERED_MAX) {
+        g->unanswered++;
+        return true;
+    }
+    g->torn = true;
+    return false;
+}
+
 void dr_g_send_stop(dr_guard *g, dr_us now, dr_stop_cause cause)
 {
-    if (g->torn) /* it would not be heard as ^C, and might complete a motion */
+    if (g->torn || !may_send(g)) /* it would not be heard as ^C, and might complete a motion */
         return;
     if (g->stops_out < RAW_STOPS_MAX)
         g->stops_out++;
@@ -112,6 +127,8 @@ void dr_g_send_query(dr_guard *g, dr_us now)
         dr_g_set_timer(g, DR_TIMER_READ, now + FRAME_GAP_US);
         return;
     }
+    if (!may_send(g))
+        return;
     dr_g_put_out(g, &query.code, 1, 1);
     g->read_phase = READ_SENT;
     g->read_have = 0;

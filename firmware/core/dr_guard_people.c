@@ -13,7 +13,7 @@ static void lose_device(dr_guard *g)
     if (moved)
         dr_g_break_off_unproved(g);
     dr_g_end_task(g);
-    g->torn = is_leaving(g) || is_running(g, DR_TIMER_LINE);
+    g->torn = g->torn || is_leaving(g) || is_running(g, DR_TIMER_LINE);
     g->out_at = g->out_count = g->out_ready = g->stops_out = 0;
     clear_timer(g, DR_TIMER_SEND);
     g->position_known = false;
@@ -171,6 +171,7 @@ static void confirm_pressed(dr_guard *g, dr_us now)
     g->confirmed = true;
     if (g->torn) { /* somebody has cycled the controller's power: it has forgotten its half of the frame */
         g->torn = false;
+        g->unanswered = 0;
         dr_g_link(g, now, g->host_open, g->plugged);
     }
     if (g->ambiguous)

@@ -57,7 +57,7 @@ typedef enum {
 #define REPEAT_STOP_US MS(150)
 #define RATE_US MS(50) /* for one more motion */
 /* A TRIO may be calibrating by itself: a minute, in pauses that grow by a second. Ten queries and the ^C after a reset are
- * fewer than the 12 bytes that a controller waits for if the guard before died within an 'S': whole, it would move. */
+ * what an MPC-200 may get unanswered; see may_send(). */
 #define PROVE_RETRY_US MS(1000)
 #define PROVE_ATTEMPTS 10u
 

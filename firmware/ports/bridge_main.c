@@ -63,7 +63,9 @@ static void send_device(dr_us now)
             survivor->mid_frame = b.may_move = true;
         dr_port_line_write(DR_LINE_DEVICE, &byte, 1);
     }
-    if (survivor->mid_frame && !dr_guard_is_mid_frame(&b.guard) && dr_port_line_is_sent(DR_LINE_DEVICE))
+    if (dr_guard_is_mid_frame(&b.guard)) /* a cable was pulled within it, or nobody has confirmed yet */
+        survivor->mid_frame = true;
+    else if (survivor->mid_frame && dr_port_line_is_sent(DR_LINE_DEVICE))
         survivor->mid_frame = false;
 }
 

@@ -1094,9 +1094,92 @@ static void a_torn_frame_is_remembered_without_limits(void)
     TEST_ASSERT_EQUAL(1, rig.wire_count);
 }
 
+/* A guard that lost its power within the pause of an 'S' left a controller that waits for 12 bytes more; the next one knows
+ * of nothing. All that may send a ^C or a query to it, in all together: it must not get the twelfth. */
+static void row_74_nobody_completes_an_s_that_nobody_remembers(void)
+{
+    for (unsigned who = 0; who < 5; who++) {
+        bench_mpc();
+        rig.by_hand = true; /* it says nothing */
+        bench_start();
+        input(DR_INPUT_KEY, true);
+        for (unsigned i = 0; i < 30; i++) {
+            run_ms(3000);
+            if (who == 0)
+                host_code(0x03);
+            stop_input(who == 1);
+            if (who == 2)
+                clear_fault();
+            if (who == 3) { /* plugged in anew */
+                cables(true, false);
+                cables(true, true);
+            }
+            run_ms(100);
+            stop_input(false);
+        }
+        run_ms(200000);
+        TEST_ASSERT_EQUAL(who == 4 ? 10 : 11, rig.wire_count);
+        expect_state(DR_GUARD_LOCKED);
+        expect_fault(who == 4 ? DR_FAULT_DEVICE_SILENT : DR_FAULT_TORN);
+        if (who == 4)
+            continue;
+        TEST_ASSERT_TRUE(status().confirm_wanted);
+        TEST_ASSERT_TRUE(dr_guard_is_mid_frame(&rig.guard)); /* to be remembered over the next reset, too */
+        rig.by_hand = false;                                 /* somebody has switched it off and on */
+        press(DR_INPUT_CONFIRM);
+        TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+        run_ms(1100);
+        clear_fault();
+        run_ms(1100);
+        expect_state(DR_GUARD_DISARMED);
+        expect_fault(DR_FAULT_NONE);
+    }
+}
+
+/* One byte of the controller's shows that it is not within a frame. A TRIO has no pause in which a frame tears. */
+static void a_controller_that_says_something_is_not_torn(void)
+{
+    bench_mpc();
+    rig.by_hand = true;
+    bench_start();
+    for (unsigned i = 0; i < 40; i++) {
+        host_code(0x03);
+        run_ms(1);
+        device_says("\r", 1);
+        run_ms(100);
+    }
+    expect_state(DR_GUARD_LOCKED);
+    TEST_ASSERT_GREATER_OR_EQUAL(40, wire_stops());
+    TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+    bench_trio();
+    rig.by_hand = true;
+    bench_start();
+    for (unsigned i = 0; i < 40; i++) {
+        host_code(0x03);
+        run_ms(3000);
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL(40, wire_stops());
+    TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+}
+
+/* One that has been proved hears each ^C, answered or not. */
+static void a_controller_that_is_proved_is_told_to_stop_as_often_as_wanted(void)
+{
+    bench_armed_mpc();
+    rig.by_hand = true;
+    for (unsigned i = 0; i < 15; i++)
+        host_code(0x03);
+    run_ms(10);
+    TEST_ASSERT_EQUAL(15, wire_stops());
+    TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(row_74_nobody_completes_an_s_that_nobody_remembers);
+    RUN_TEST(a_controller_that_says_something_is_not_torn);
+    RUN_TEST(a_controller_that_is_proved_is_told_to_stop_as_often_as_wanted);
     RUN_TEST(the_controller_to_order_works_when_nothing_is_ordered);
     RUN_TEST(row_74_a_reset_within_a_frame_leaves_nothing_that_completes_it);
     RUN_TEST(a_torn_frame_is_remembered_without_limits);

@@ -87,12 +87,14 @@ class Guard:
                      *args]
         self.err_path = os.path.join(directory, "stderr")
         self.popen = popen
+        self.lock_directory = directory
         self.start(wait)
 
     def start(self, wait="disarmed"):
         with open(self.err_path, "ab") as err:
             options = dict(stdout=subprocess.PIPE, stderr=err, stdin=subprocess.DEVNULL)
             options.update(self.popen)
+            options["env"] = {**(options.get("env") or os.environ), "DRYRIG_LOCK_DIR": self.lock_directory}
             self.process = subprocess.Popen([PROGRAM, *self.args], **options)
         line = self.process.stdout.readline().decode()
         if not line.startswith("ready /dev/pts/"):

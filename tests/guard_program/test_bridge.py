@@ -163,6 +163,23 @@ class Stopping(unittest.TestCase):
             self.assertEqual(port.ask(line(15, 10, 0, 0), 1), b"\r")
             self.assertIsNone(e.process.poll())
 
+    def test_a_stop_that_is_cleared_at_once_is_told_as_one(self):
+        with guarded("mpc", rig(guard.MPC)) as (_, g, port), Channel(g.socket) as channel:
+            self.moving(g, port)
+            channel.socket.sendall(b"stop\nclear\n")
+            channel.answer()
+            self.assertEqual((channel.answer()["state"], g.status().get("disarmed_says")), ("disarmed", None))
+            emu.wait_until(lambda: "disarmed" in g.err().split("dryrig-guard: stopped")[-1], "the words")
+            self.assertIn("dryrig-guard: stopped", g.err())
+
+    def test_an_order_without_the_end_of_its_line(self):
+        with guarded("mpc", rig(guard.MPC)) as (_, g, port), Channel(g.socket) as channel:
+            self.moving(g, port)
+            channel.socket.sendall(b"stop")
+            channel.socket.shutdown(socket.SHUT_WR)
+            self.assertEqual(channel.answer()["ok"], True)
+            g.wait_for("stopped")
+
     def test_disarming_stops(self):
         with guarded("mpc", rig(guard.MPC)) as (_, g, port):
             self.moving(g, port)

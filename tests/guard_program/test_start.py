@@ -74,6 +74,21 @@ class Failing(unittest.TestCase):
                 self.fails(directory, 1, ["1 to 107 characters"], *base, "--control", directory + "/" + "x" * 200)
                 self.assertEqual(g.status()["state"], "disarmed")
 
+    def test_no_place_for_the_mark(self):
+        with emu.directory() as directory, emu.Emulator("mpc") as e:
+            conf = config_file(directory)
+            for where, words in (("/none", "No such file or directory"), ("/rig.conf", "Not a directory")):
+                done = subprocess.run([guard.PROGRAM, "--port", e.path, "--config", conf], capture_output=True, check=False,
+                                      env={**os.environ, "DRYRIG_LOCK_DIR": directory + where}, timeout=emu.LIMIT_S)
+                self.assertEqual((done.returncode, done.stdout), (1, b""))
+                self.assertIn(words, done.stderr.decode())
+                self.assertIn("DRYRIG_LOCK_DIR names another directory", done.stderr.decode())
+            with emu.directory() as other, Guard(other, other + "/later", rig(guard.MPC), wait="locked"):
+                done = subprocess.run([guard.PROGRAM, "--port", "later", "--config", conf], capture_output=True, check=False, cwd=other,
+                                      env={**os.environ, "DRYRIG_LOCK_DIR": other}, timeout=emu.LIMIT_S)
+                self.assertEqual((done.returncode, done.stdout), (1, b""))
+                self.assertIn("later is in use by another guard", done.stderr.decode())
+
     def test_a_stdout_that_is_full(self):
         with emu.directory() as directory, emu.Emulator("mpc") as e, open("/dev/full", "wb") as full:
             conf = config_file(directory)
@@ -272,12 +287,49 @@ class Killed(unittest.TestCase):
         self.host.stdin.flush()
         self.guard.wait_for("moving")
         self.guard.kill()
+        self.assertEqual(self.mark(), "1")
         self.guard.start("locked")
-        emu.wait_until(lambda: self.guard.status()["fault"] == "device-silent", "the fault")
+        for how in (signal.SIGTERM, signal.SIGKILL, None): # each start knows of it, and nothing that anybody does is sent
+            status = self.guard.status()
+            self.assertEqual((status["fault"], status["next"], status["confirm_wanted"]), ("torn-frame", "confirm", True))
+            self.assertIn("switch it off and on, then 'confirm'", status["fault_says"])
+            self.kill_host()
+            self.start_host()
+            self.host.stdin.write(b"\x03C" * 15)
+            self.host.stdin.flush()
+            self.guard.order("stop")
+            self.assertIn("see fault and needs", self.guard.order("clear")["why"])
+            self.assertFalse(self.guard.order("arm")["ok"])
+            if how is not None:
+                self.guard.stop(how)
+                self.assertEqual(self.mark(), "1")
+                self.guard.start("locked")
+        self.assertIn("switch it off and on, then 'confirm'", self.guard.err())
         self.emulator.stop(signal.SIGKILL)
-        emu.wait_until(lambda: self.guard.status()["fault"] == "no-device", "the device to go")
         self.restart_device()
+        guard.pause(0.6) # for the guard to find the port
+        self.assertEqual(self.guard.status()["fault"], "torn-frame")
+        self.assertEqual(self.guard.order("confirm")["ok"], True)
         self.nothing_moves()
+        emu.wait_until(lambda: self.mark() == "0", "the mark to go")
+        self.guard.arm()
+
+    def mark(self):
+        name, = (name for name in os.listdir(self.directory) if name.startswith("dryrig-guard."))
+        self.assertEqual(stat.S_IMODE(os.stat(self.directory + "/" + name).st_mode), 0o666) # for another user's guard
+        with open(self.directory + "/" + name, encoding="ascii") as file:
+            return file.read()
+
+    def test_the_guard_while_the_controller_does_not_answer(self):
+        """It may wait for the rest of an S that nobody remembers: the bytes of many guards must not become it."""
+        with emu.directory() as directory, emu.Emulator("mpc", "--device", "none") as e:
+            with Guard(directory, e.path, rig(guard.MPC), wait="locked") as g:
+                emu.wait_until(lambda: g.status()["fault"] == "device-silent", "the query")
+                g.kill()
+                g.start("locked")
+                self.assertEqual(g.status()["fault"], "torn-frame")
+                g.order("confirm")
+                emu.wait_until(lambda: g.status()["fault"] == "device-silent", "the query")
 
     def test_the_host(self):
         self.start_move()

@@ -20,6 +20,7 @@
 
 #define S_US UINT64_C(1000000)
 #define TRY_AGAIN_US (S_US / 2)     /* while the controller's port is gone */
+#define DRAIN_US (S_US / 1000)      /* a frame of 14 bytes takes 1.1 to 2.4 ms */
 #define CHECK_US S_US               /* memory, while something may move */
 #define REST_US (3 * S_US)          /* at the end; then it is left as it is */
 #define STEP_US (UINT64_C(1) << 30) /* the guard tells instants apart up to 2^31 us */
@@ -124,10 +125,37 @@ static void send_device(bridge *b, const uint8_t *bytes, size_t count)
 {
     if (b->device.fd < 0)
         return;
-    if (device_write(&b->device, bytes, count))
+    if (device_write(&b->device, bytes, count)) {
+        b->unanswered += (uint32_t)count;
         record_bytes(b, '>', bytes, count);
-    else
+    } else {
         lose_device(b, "it takes no more bytes, or is gone");
+    }
+}
+
+static void set_mark(bridge *b, bool on)
+{
+    if (mark_set(&b->mark, on) || b->mark_lost)
+        return;
+    b->mark_lost = true;
+    say("dryrig-guard: %s cannot be written: %s\n", b->mark.path, strerror(errno));
+}
+
+/* What is to be known after a kill. Half a frame may be in the controller: this guard has sent one, or was told so; or an
+ * MPC-200 has not answered since it was started, and may have been waiting before (it is a guess, but a restart must not give it
+ * as many bytes again). */
+static void keep_mark(bridge *b, bool is_ending)
+{
+    dr_guard_status status;
+    dr_guard_get_status(&b->guard, &status);
+    if (status.state != DR_GUARD_LOCKED)
+        b->unanswered = 0;
+    const bool is_silent = b->rig.limits.kind == DR_MPC && status.state == DR_GUARD_LOCKED && b->unanswered > 0;
+    const bool may_be_torn = dr_guard_is_mid_frame(&b->guard) || is_silent;
+    const bool is_leaving =
+        b->mark.is_set && !is_ending && !device_is_sent(&b->device); /* the kernel sends it at the end */
+    b->mark_due_us = is_leaving && !may_be_torn ? b->now_us + DRAIN_US : 0;
+    set_mark(b, may_be_torn || is_leaving);
 }
 
 /* A stop leaves at once; a reply next; anything else for the controller when its record is kept. */
@@ -136,6 +164,8 @@ void bridge_pump(bridge *b)
     uint8_t out[CHUNK], in[CHUNK];
     const size_t out_count = dr_guard_pull_device(&b->guard, bridge_now(b), out, sizeof out);
     const bool stops = is_stop(out, out_count);
+    if (dr_guard_is_mid_frame(&b->guard)) /* before its first byte is out */
+        set_mark(b, true);
     if (out_count > 0 && stops)
         send_device(b, out, out_count);
     const size_t in_count = dr_guard_pull_host(&b->guard, bridge_now(b), in, sizeof in);
@@ -194,8 +224,10 @@ static void listen_to_device(bridge *b)
 {
     uint8_t bytes[CHUNK];
     const ssize_t count = device_read(&b->device, bytes, sizeof bytes);
-    if (count > 0)
+    if (count > 0) {
+        b->unanswered = 0;
         record_bytes(b, '<', bytes, (size_t)count);
+    }
     if (count > 0)
         dr_guard_push_device(&b->guard, bridge_now(b), bytes, (size_t)count);
     else if (count < 0)
@@ -241,6 +273,8 @@ static bool next_due(const bridge *b, uint64_t *due_us)
         sooner(due_us, &any, order_us);
     if (may_move(b))
         sooner(due_us, &any, b->next_check_us);
+    if (b->mark_due_us != 0)
+        sooner(due_us, &any, b->mark_due_us);
     return any;
 }
 
@@ -288,6 +322,7 @@ static void serve(bridge *b, const struct pollfd *fds)
     }
     orders_continue(b);
     orders_tell(b);
+    keep_mark(b, false);
 }
 
 /* -- Starting ---------------------------------------------------------------------------------------------------------- */
@@ -356,7 +391,10 @@ static int start_and_run(bridge *b, bool after_crash)
     struct pollfd fds[FDS];
     introduce(b);
     dr_guard_init(&b->guard, &b->rig.limits, b->ring, BRIDGE_RING);
-    dr_guard_start(&b->guard, bridge_now(b), after_crash ? DR_START_AFTER_RESET : DR_START_POWER_ON);
+    dr_guard_start(&b->guard, bridge_now(b),
+                   b->mark.is_set ? DR_START_MID_FRAME
+                   : after_crash  ? DR_START_AFTER_RESET
+                                  : DR_START_POWER_ON);
     if (printf("ready %s\n", b->host.path) < 0 || fflush(stdout) != 0)
         return fail("cannot write the line 'ready' to stdout", strerror(errno));
     read_hints(b);
@@ -368,6 +406,7 @@ static int start_and_run(bridge *b, bool after_crash)
         serve(b, fds);
     }
     come_to_rest(b);
+    keep_mark(b, true);
     return 0;
 }
 
@@ -415,10 +454,16 @@ int bridge_run(bridge *b, const bridge_options *options)
     const int result = try_device(b);
     if (result != DRYRIG_OK && result != DRYRIG_ERR_NO_PORT)
         return fail("--port", b->device_says);
+    char why[RIG_WHY_MAX];
+    if (!mark_open(&b->mark, options->port, why, sizeof why)) {
+        device_close(&b->device);
+        return fail("--port", why);
+    }
     const char *const wrong = pty_open(&b->host, b->inotify);
     const int status = wrong != NULL ? fail(wrong, strerror(errno)) : open_rest(b);
     if (wrong == NULL)
         pty_close(&b->host);
     device_close(&b->device);
+    mark_close(&b->mark);
     return status;
 }

@@ -11,6 +11,7 @@
 #include "control.h"
 #include "device.h"
 #include "journal.h"
+#include "mark.h"
 #include "pty.h"
 #include "recording.h"
 #include "rig.h"
@@ -36,10 +37,14 @@ typedef struct {
     control control;
     journal journal;
     recording recording; /* of the controller's line */
+    mark mark;           /* for the next guard, if this one is killed */
+    bool mark_lost;      /* it could not be written; somebody was told */
+    uint32_t unanswered; /* bytes to the controller since its last, while locked */
 
     uint64_t epoch_us, now_us;     /* of the monotonic clock; since then, when the present event came */
     uint64_t next_try_us;          /* to open the device again */
     uint64_t next_check_us;        /* of memory, while not disarmed */
+    uint64_t mark_due_us;          /* to look whether the line has sent a frame's last byte; 0: not now */
     char device_says[RIG_WHY_MAX]; /* why the device is not there */
     int inotify, signals;
     bool log_said;

@@ -205,10 +205,12 @@ static void listen_to(control_client *who, void (*order)(void *, control_client 
     const ssize_t count = recv(who->fd, who->line + who->have, sizeof who->line - 1 - who->have, MSG_DONTWAIT);
     if (count < 0 && (errno == EAGAIN || errno == EINTR))
         return;
-    if (count <= 0) {
+    if (count < 0 || (count == 0 && who->have == 0)) {
         drop(who);
         return;
     }
+    if (count == 0) /* the end ends a line, too: it may be a stop */
+        who->line[who->have++] = '\n';
     who->have += (size_t)count;
     char *end;
     while (who->fd >= 0 && (end = memchr(who->line, '\n', who->have)) != NULL) {

@@ -83,3 +83,9 @@ bool device_write(device *d, const uint8_t *bytes, size_t count)
     while (written < 0 && errno == EINTR); /* no signal is caught: once at most */
     return written >= 0 && (size_t)written == count;
 }
+
+bool device_is_sent(const device *d)
+{
+    int left = 0;
+    return d->fd < 0 || ioctl(d->fd, TIOCOUTQ, &left) != 0 || left == 0;
+}

@@ -25,5 +25,7 @@ void device_close(device *d);
 ssize_t device_read(device *d, uint8_t *bytes, size_t room);
 /* False: the port is gone, or takes no more: the rest of a frame may be lost. */
 bool device_write(device *d, const uint8_t *bytes, size_t count);
+/* Is it all off this computer? */
+bool device_is_sent(const device *d);
 
 #endif

@@ -50,9 +50,11 @@ static const struct {
     [DR_FAULT_FRAME_LOST] = {"frame-lost", "A calibration was broken off: coordinates mean nothing until a whole one."},
     [DR_FAULT_STOP_WIRING] = {"stop-wiring", "The two stop contacts disagree."},
     [DR_FAULT_DAMAGED] = {"damaged", "Limits or state in memory are not what they were. Restart the guard."},
-    [DR_FAULT_TORN] = {"torn-frame",
-                       "The cable went within a command, whose rest the controller would take from any byte: "
-                       "switch it off and on, then confirm. Until then nothing is sent."},
+    [DR_FAULT_TORN] =
+        {"torn-frame",
+         "The controller may wait for the rest of a command (the cable or the guard before went within one, "
+         "or it does not answer), and would take it from any byte: switch it off and on, then 'confirm'. "
+         "Until then nothing is sent."},
 };
 const char *guard_words_fault(uint8_t fault) { return fault < DR_FAULTS ? faults[fault].name : "unknown"; }
 const char *guard_words_fault_says(uint8_t fault) { return fault < DR_FAULTS ? faults[fault].says : ""; }

@@ -36,6 +36,8 @@ static const char *next_order(const bridge *b, const dr_guard_status *status)
         return status->confirm_wanted ? "confirm" : NULL;
     if (has(status, DR_NEEDS_CLEAR | DR_NEEDS_STOP_RELEASED))
         return "clear";
+    if (status->fault == DR_FAULT_TORN)
+        return "confirm";
     if (has(status, DR_NEEDS_DEVICE | DR_NEEDS_LOG | DR_NEEDS_REST))
         return NULL;
     if (status->confirm_wanted)
@@ -115,7 +117,7 @@ static cJSON *status_object(const bridge *b, const dr_guard_status *status, cons
         (void)cJSON_AddStringToObject(all, "fault_says", guard_words_fault_says(status->fault));
     if (status->state == DR_GUARD_DISARMED && b->disarmed_says != NULL)
         (void)cJSON_AddStringToObject(all, "disarmed_says", b->disarmed_says);
-    if (has(status, DR_NEEDS_DEVICE))
+    if (has(status, DR_NEEDS_DEVICE) && b->device_says[0] != '\0')
         (void)cJSON_AddStringToObject(all, "device_says", b->device_says);
     add_needs(b, status, all);
     const char *const next = next_order(b, status);
@@ -273,6 +275,10 @@ static void watch_arming(bridge *b)
 void orders_continue(bridge *b)
 {
     dr_guard_status status;
+    if (b->order != ORDER_NONE) { /* it may have waited for this state, and make another one of it */
+        watch_arming(b);
+        orders_tell(b);
+    }
     if (b->calibrate_until_us != 0 && b->now_us >= b->calibrate_until_us) {
         b->calibrate_until_us = 0;
         set_input(b, DR_INPUT_MAY_CALIBRATE, false);
@@ -400,7 +406,7 @@ static bool is_same(const dr_guard_status *now, const dr_guard_status *told)
 static void say_state(bridge *b, const dr_guard_status *now)
 {
     const char *const next = next_order(b, now);
-    const char *const says = has(now, DR_NEEDS_DEVICE)     ? b->device_says
+    const char *const says = has(now, DR_NEEDS_DEVICE) && now->fault != DR_FAULT_TORN ? b->device_says
                              : now->fault != DR_FAULT_NONE ? guard_words_fault_says(now->fault)
                              : now->state == DR_GUARD_DISARMED && b->disarmed_says != NULL ? b->disarmed_says
                                                                                            : "";
