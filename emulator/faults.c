@@ -124,13 +124,14 @@ static uint32_t chance(faults *f, uint32_t most)
     return (uint32_t)(((f->random * UINT64_C(0x2545F4914F6CDD1D)) >> 33) % most);
 }
 
-/* Does a rule of this fault strike now? *rule: as it was. */
-static bool strikes(faults *f, fault_id id, uint64_t now_us, uint8_t op, fault_rule *rule)
+/* Does a rule of this fault strike now? leg: NULL, or only one whose axis has a way to go in it. *rule: as it was. */
+static bool strikes_leg(faults *f, fault_id id, uint64_t now_us, uint8_t op, const dr_leg *leg, fault_rule *rule)
 {
     for (uint8_t i = 0; i < f->count; i++) {
         fault_rule *const r = &f->rules[i];
         if (r->id != id || (r->op != DR_OP_NONE && r->op != op) || now_us < r->from_us || now_us >= r->until_us ||
-            (r->chance_millionths < FAULT_SURE && chance(f, FAULT_SURE) >= r->chance_millionths))
+            (r->chance_millionths < FAULT_SURE && chance(f, FAULT_SURE) >= r->chance_millionths) ||
+            (leg != NULL && leg->from[r->axis] == leg->to[r->axis]))
             continue;
         *rule = *r;
         f->struck |= UINT32_C(1) << id;
@@ -139,6 +140,11 @@ static bool strikes(faults *f, fault_id id, uint64_t now_us, uint8_t op, fault_r
         return true;
     }
     return false;
+}
+
+static bool strikes(faults *f, fault_id id, uint64_t now_us, uint8_t op, fault_rule *rule)
+{
+    return strikes_leg(f, id, now_us, op, NULL, rule);
 }
 
 /* -- Answers and streamed frames ------------------------------------------------------------------------------------------ */
@@ -297,10 +303,10 @@ static void lose_power(faults *f, uint64_t now_us, const dr_controller *c, fault
 static void begin_leg(faults *f, uint64_t now_us, dr_controller *c)
 {
     fault_rule r;
-    const uint8_t stalled = strikes(f, FAULT_STALL_AXIS, now_us, c->move_op, &r) ? r.axis : DR_AXES;
+    const uint8_t stalled = strikes_leg(f, FAULT_STALL_AXIS, now_us, c->move_op, &c->leg, &r) ? r.axis : DR_AXES;
     if (stalled < DR_AXES || f->slow_times > 0)
         (void)dr_controller_spoil_leg(c, (dr_us)now_us, stalled, times_that_fit(c, f->slow_times));
-    if (strikes(f, FAULT_SLIP_AXIS, now_us, c->move_op, &r)) {
+    if (strikes_leg(f, FAULT_SLIP_AXIS, now_us, c->move_op, &c->leg, &r)) {
         f->slips = true;
         f->slip_axis = r.axis;
         f->slip_drive = c->active;

@@ -332,6 +332,31 @@ static void a_stalled_axis_gets_half_of_its_way_and_says_so(void)
     check_at(0, 0, 0);
 }
 
+/* At 30 degrees a TRIO's W runs Y, then Z, then X [T page 1]: X and Z are struck in the leg in which they move. */
+static void an_axis_is_struck_in_the_leg_in_which_it_moves(void)
+{
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        for (unsigned slips = 0; slips < 2; slips++) {
+            const uint32_t from = 10667, to = from + 1000;
+            switch_on(DR_TRIO, 1);
+            run_out();
+            fault_rule *const rule = rule_of(slips ? FAULT_SLIP_AXIS : FAULT_STALL_AXIS);
+            rule->axis = axis;
+            add(rule);
+            say_move('W', from, from, from); /* nothing moves: the rule waits */
+            run_out();
+            say_move('W', to, to, to);
+            run_out();
+            uint32_t expected[DR_AXES] = {to, to, to};
+            if (slips)
+                TEST_ASSERT_EQUAL_INT64(from, tip(axis));
+            else
+                expected[axis] = from + 500;
+            check_at(expected[DR_X], expected[DR_Y], expected[DR_Z]);
+            check_sent("\r\r", 2);
+        }
+}
+
 static void a_slow_move_lasts_as_many_times_as_long(void)
 {
     fault_rule *const rule = rule_of(FAULT_SLOW_MOTION);
@@ -618,6 +643,7 @@ int main(void)
     RUN_TEST(a_wedge_ends_with_a_power_cycle);
     RUN_TEST(the_plug_comes_out_when_the_command_is_whole);
     RUN_TEST(a_stalled_axis_gets_half_of_its_way_and_says_so);
+    RUN_TEST(an_axis_is_struck_in_the_leg_in_which_it_moves);
     RUN_TEST(a_slow_move_lasts_as_many_times_as_long);
     RUN_TEST(all_legs_of_a_slow_move_are_slow);
     RUN_TEST(a_slow_move_is_stopped_where_it_is);

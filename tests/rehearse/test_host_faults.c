@@ -196,7 +196,11 @@ enum {
     STOPS = 8,
     COMMANDS = 16,
     LEGS = 32,
-    ALL = ANSWERS | HOST_BYTES | COMMANDS
+    X_MOVES = 64,
+    Y_MOVES = 128,
+    Z_MOVES = 256,
+    ALL = ANSWERS | HOST_BYTES | COMMANDS,
+    ALL_MOVE = LEGS | X_MOVES | Y_MOVES | Z_MOVES
 };
 
 typedef struct {
@@ -220,15 +224,15 @@ static const operation operations[] = {
     {"mode", op_mode, QUERY_US, 1u << MPC, ALL},
     {"resync", op_resync, QUERY_US, BOTH, ALL},
     {"stop", op_stop, QUERY_US, BOTH, ALL | STOPS},
-    {"move", op_move, MOTION_US, BOTH, ALL | LEGS},
-    {"move in home order", op_move_in_home_order, MOTION_US, 1u << TRIO, ALL | LEGS},
-    {"axis", op_axis, MOTION_US, BOTH, ALL | LEGS},
-    {"line", op_line, MOTION_US, BOTH, ALL | LEGS},
-    {"stream", op_stream, MOTION_US, 1u << MPC, ALL | LEGS | FRAMES},
-    {"interrupt", op_interrupt, MOTION_US, BOTH, ALL | LEGS | STOPS},
-    {"home", op_home, UNKNOWN_US, BOTH, ALL | LEGS},
-    {"work", op_work, 2 * UNKNOWN_US, BOTH, ALL | LEGS},
-    {"calibrate", op_calibrate, UNKNOWN_US, BOTH, ALL | LEGS},
+    {"move", op_move, MOTION_US, BOTH, ALL | ALL_MOVE},
+    {"move in home order", op_move_in_home_order, MOTION_US, 1u << TRIO, ALL | ALL_MOVE},
+    {"axis", op_axis, MOTION_US, BOTH, ALL | LEGS | Z_MOVES},
+    {"line", op_line, MOTION_US, BOTH, ALL | ALL_MOVE},
+    {"stream", op_stream, MOTION_US, 1u << MPC, ALL | ALL_MOVE | FRAMES},
+    {"interrupt", op_interrupt, MOTION_US, BOTH, ALL | LEGS | Y_MOVES | Z_MOVES | STOPS},
+    {"home", op_home, UNKNOWN_US, BOTH, ALL | ALL_MOVE},
+    {"work", op_work, 2 * UNKNOWN_US, BOTH, ALL | ALL_MOVE},
+    {"calibrate", op_calibrate, UNKNOWN_US, BOTH, ALL | ALL_MOVE},
 };
 #define OPERATIONS (sizeof operations / sizeof operations[0])
 
@@ -266,10 +270,10 @@ static const fault_row rows[] = {
     {"lose-host-byte", "", NO_CR, HOST_BYTES, true},
     {"ignore-stop", "", E(CANNOT_STOP), STOPS, false},
     {"wedge", "", NO_CR, COMMANDS, true},
-    {"stall-axis", "x", E(ELSEWHERE), LEGS, false},
-    {"stall-axis", "y", E(ELSEWHERE), LEGS, false},
-    {"stall-axis", "z", E(ELSEWHERE), LEGS, false},
-    {"slip-axis", "z", 0, LEGS, false}, /* no host can see it: everything succeeds, and the tip is elsewhere */
+    {"stall-axis", "x", E(ELSEWHERE), X_MOVES, false},
+    {"stall-axis", "y", E(ELSEWHERE), Y_MOVES, false},
+    {"stall-axis", "z", E(ELSEWHERE), Z_MOVES, false},
+    {"slip-axis", "z", 0, Z_MOVES, false}, /* no host can see it: everything succeeds, and the tip is elsewhere */
     {"slow-motion", "", 0, LEGS, false},
     {"slow-motion", "20", E(TIMEOUT), LEGS, false},
     {"power-loss", "", E(TIMEOUT), LEGS, false},
