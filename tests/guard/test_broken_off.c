@@ -156,6 +156,184 @@ static void a_streamed_position_that_is_cut_off_swallows_no_cr(void)
     expect_heard("\xFF\xFF\xFF\x40\r", 5);
 }
 
+static void a_host_that_has_stopped_already_is_told_apart(void)
+{
+    armed(DR_TRIO, 0);
+    host_code('c');
+    run_us(500);
+    device_says("abc", 3);
+    run_us(2000000); /* the rest never comes */
+    TEST_ASSERT_NOT_NULL(last_record(DR_EVENT_NO_REPLY));
+    host_code(3);
+    run_us(500);
+    stop_input(true); /* behind the host's ^C, whose CR comes first */
+    device_says("\r", 1);
+    TEST_ASSERT_EQUAL(0, rig.guard.stop_crs);
+    device_says("\r", 1);
+    TEST_ASSERT_EQUAL(1, rig.guard.stop_crs);
+}
+
+static void an_old_reply_that_never_came_hides_no_cr(void)
+{
+    armed(DR_TRIO, 0);
+    host_code('c');
+    run_us(500);
+    device_says("abc", 3);
+    run_us(2000000);
+    host_line(15, 48000, 40000, 40000);
+    run_us(2000);
+    says_home();
+    run_us(10000);
+    host_code(3);
+    run_us(1000);
+    device_says("\r", 1);
+    run_us(300000);
+    TEST_ASSERT_EQUAL(1, wire_stops());
+    expect_heard("abc", 3);
+}
+
+static void a_stop_refuses_only_what_was_waiting(void)
+{
+    armed(DR_TRIO, 0);
+    stop_input(true);
+    TEST_ASSERT_EQUAL(0, status().refused);
+    armed(DR_MPC, 0);
+    host_line(15, 84000, 80000, 80000);
+    run_us(2000);
+    says_home();
+    run_us(12000);
+    stop_input(true); /* within the frame: it has begun */
+    TEST_ASSERT_EQUAL(0, status().refused);
+    armed(DR_TRIO, 0);
+    host_line(15, 48000, 40000, 40000);
+    stop_input(true);
+    TEST_ASSERT_EQUAL(1, status().refused);
+    expect_refused(DR_REASON_CANCELLED);
+}
+
+static void a_stop_of_what_cannot_be_stopped_waits_for_its_own_end(void)
+{
+    armed(DR_TRIO, 0);
+    host_axis('x', 40800);
+    run_us(2000);
+    says_home();
+    run_us(5000);
+    const dr_us ends = rig.guard.at[DR_TIMER_TASK];
+    stop_input(true);
+    TEST_ASSERT_TRUE(status().buzzer);
+    device_says("n", 1); /* whatever that is, it is not the end */
+    TEST_ASSERT_EQUAL_UINT32(ends, rig.guard.at[DR_TIMER_TASK]);
+    device_says("\r", 1);
+    TEST_ASSERT_NOT_EQUAL(ends, rig.guard.at[DR_TIMER_TASK]);
+}
+
+static void each_stop_counts_its_own_crs(void)
+{
+    armed(DR_TRIO, 0);
+    for (unsigned round = 0; round < 2; round++) {
+        host_line(15, 48000, 40000, 40000);
+        run_us(2000);
+        says_home();
+        run_us(10000);
+        host_code(3);
+        run_us(1000);
+        if (round == 0)
+            device_says("\r\r", 2);
+        else
+            run_us(300000); /* this time the controller says nothing */
+        rest_at(says_home);
+        expect_state(DR_GUARD_IDLE);
+    }
+    expect_cr();
+    expect_silence();
+}
+
+static void ctrl_c_is_sent_three_times_whatever_it_is_that_asks_for_it(void)
+{
+    armed(DR_TRIO, 0);
+    host_line(15, 48000, 40000, 40000);
+    run_us(2000);
+    says_home();
+    run_us(10000);
+    host_code(3);
+    run_us(151000);
+    TEST_ASSERT_EQUAL(2, wire_stops()); /* no CR in 150 ms */
+    device_says("\r", 1);
+    for (uint32_t i = 0; i < 5; i++) {
+        run_us(100000);
+        trio_says(41000 + 10 * i); /* still moving */
+    }
+    TEST_ASSERT_EQUAL(3, wire_stops());
+}
+
+static void a_fault_says_why_it_stops(void)
+{
+    armed(DR_TRIO, 0);
+    host_line(15, 48000, 40000, 40000);
+    run_us(2000);
+    says_home();
+    run_us(10000);
+    device_says("0123456789abcdefg", 17);
+    TEST_ASSERT_EQUAL(DR_STOP_NOISE, last_record(DR_EVENT_STOP)->code);
+    armed(DR_TRIO, 0);
+    host_line(15, 48000, 40000, 40000);
+    run_us(2000);
+    says_home();
+    run_us(10000);
+    device_says("\r", 1);
+    run_us(2002000); /* and no position */
+    TEST_ASSERT_EQUAL(DR_STOP_DEADLINE, last_record(DR_EVENT_STOP)->code);
+}
+
+static void a_fault_at_rest_breaks_nothing_off(void)
+{
+    armed(DR_TRIO, 0);
+    host_line(15, 41000, 40000, 40000);
+    run_us(2000);
+    says_home();
+    run_us(10000);
+    host_code(3); /* too late: it is there already */
+    run_us(1000);
+    device_says("\r", 1);
+    rest_at(says_41000);
+    expect_state(DR_GUARD_IDLE);
+    TEST_ASSERT_FALSE(rig.guard.scene.old[0].is_open);
+    device_says("0123456789abcdefg", 17);
+    expect_fault(DR_FAULT_DEVICE_NOISE);
+    TEST_ASSERT_FALSE(rig.guard.scene.old[0].is_open);
+}
+
+static void limits_that_are_damaged_stop_what_is_under_way_and_nothing_else(void)
+{
+    dr_us when;
+    armed(DR_TRIO, 0);
+    rig.limits.margin_q ^= 1;
+    TEST_ASSERT_FALSE(dr_guard_self_check(&rig.guard, (dr_us)(rig.clock_at_start + rig.now)));
+    run_us(1000000);
+    expect_fault(DR_FAULT_DAMAGED);
+    TEST_ASSERT_EQUAL(0, wire_stops());
+    TEST_ASSERT_FALSE(dr_guard_due(&rig.guard, &when));
+    armed(DR_TRIO, 0);
+    host_line(15, 41000, 40000, 40000); /* a query waits for its turn */
+    const uint32_t before = rig.wire_count;
+    rig.limits.margin_q ^= 1;
+    TEST_ASSERT_FALSE(dr_guard_self_check(&rig.guard, (dr_us)(rig.clock_at_start + rig.now)));
+    run_us(1000000);
+    TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
+    TEST_ASSERT_EQUAL(1, wire_stops());
+    TEST_ASSERT_FALSE(dr_guard_due(&rig.guard, &when));
+    armed(DR_MPC, 0);
+    host_line(15, 84000, 80000, 80000);
+    run_us(2000);
+    says_home();
+    run_us(12000); /* within the frame: it has to be whole before ^C is heard */
+    rig.limits.margin_q ^= 1;
+    TEST_ASSERT_FALSE(dr_guard_self_check(&rig.guard, (dr_us)(rig.clock_at_start + rig.now)));
+    run_us(1000000);
+    TEST_ASSERT_EQUAL(1, wire_stops());
+    TEST_ASSERT_EQUAL_HEX8(0x03, rig.wire[rig.wire_count - 1]);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -165,5 +343,14 @@ int main(void)
     RUN_TEST(a_cable_pulled_in_a_stop_ends_it);
     RUN_TEST(the_end_of_another_drives_way_is_no_end);
     RUN_TEST(a_streamed_position_that_is_cut_off_swallows_no_cr);
+    RUN_TEST(a_host_that_has_stopped_already_is_told_apart);
+    RUN_TEST(an_old_reply_that_never_came_hides_no_cr);
+    RUN_TEST(a_stop_refuses_only_what_was_waiting);
+    RUN_TEST(a_stop_of_what_cannot_be_stopped_waits_for_its_own_end);
+    RUN_TEST(each_stop_counts_its_own_crs);
+    RUN_TEST(ctrl_c_is_sent_three_times_whatever_it_is_that_asks_for_it);
+    RUN_TEST(a_fault_says_why_it_stops);
+    RUN_TEST(a_fault_at_rest_breaks_nothing_off);
+    RUN_TEST(limits_that_are_damaged_stop_what_is_under_way_and_nothing_else);
     return UNITY_END();
 }

@@ -430,6 +430,45 @@ static void fifteen_ctrl_c_running_are_passed_on_and_no_more(void)
     TEST_ASSERT_EQUAL(5, status().dropped_bytes);
 }
 
+/* How long a motion of an MPC-200 may last, in us, once it has left. */
+static uint32_t lasts(int code, uint8_t level, uint32_t y, uint16_t facts)
+{
+    static const uint8_t at_home[] = {1, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x0D};
+    bench_mpc();
+    rig.by_hand = true;
+    rig.limits.rig = (uint16_t)(DR_RIG_KNOBS_LOCKED | facts);
+    bench_start();
+    input(DR_INPUT_MAY_CALIBRATE, true);
+    input(DR_INPUT_KEY, true);
+    run_us(1000000);
+    device_says(at_home, 14);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    device_says(at_home, 14);
+    run_us(100000);
+    device_says(at_home, 14);
+    if (code == 'N')
+        host_code('N');
+    else if (code == 'S')
+        host_line(level, 80000, y, 80000);
+    else
+        host_point(code, 80000, y, 80000);
+    run_us(2000);
+    device_says(at_home, 14);
+    const uint32_t before = rig.wire_count;
+    run_until_sent(before + (code == 'N' ? 1 : code == 'S' ? 14 : 13));
+    return rig.guard.at[DR_TIMER_TASK] - guard_clock();
+}
+
+static void small_moves_calibrations_and_slow_lines_have_their_own_spans(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(100000, lasts('M', 0, 80015, 0)); /* may be ignored: 15 microsteps */
+    TEST_ASSERT_EQUAL_UINT32(100000, lasts('S', 15, 80000 - 15, 0));
+    TEST_ASSERT_EQUAL_UINT32(2000000 + 500, lasts('M', 0, 80016, 0));     /* 1 um at 3 mm/s */
+    TEST_ASSERT_EQUAL_UINT32(2000000 + 1846153, lasts('S', 0, 81600, 0)); /* 100 um at 81.25 um/s */
+    TEST_ASSERT_EQUAL_UINT32(60000000, lasts('N', 0, 0, DR_RIG_MAY_CALIBRATE));
+}
+
 static void noise_is_counted_by_the_second(void)
 {
     proved();
@@ -523,6 +562,7 @@ int main(void)
     RUN_TEST(what_is_left_of_a_reading_is_no_answer_to_ctrl_c);
     RUN_TEST(a_stop_while_the_end_is_verified_keeps_the_target_possible);
     RUN_TEST(fifteen_ctrl_c_running_are_passed_on_and_no_more);
+    RUN_TEST(small_moves_calibrations_and_slow_lines_have_their_own_spans);
     RUN_TEST(noise_is_counted_by_the_second);
     RUN_TEST(stop_contacts_may_disagree_for_50_ms_and_bounce_for_20_ms);
     RUN_TEST(one_call_does_sixteen_things_that_are_due);

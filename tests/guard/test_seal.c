@@ -292,6 +292,62 @@ static void damage_forgets_no_torn_frame(void)
     }
 }
 
+/* -- Readings that are too old --------------------------------------------------------------------------------------------- */
+
+/* A knob moves the tip from the reading until the motion begins; the margin reckons with 10 ms, of which 2.5 are the frame. */
+static void a_motion_leaves_in_time_or_is_read_for_again(void)
+{
+    for (uint32_t late_us = 7500; late_us <= 7501; late_us++) {
+        armed();
+        rig.limits.rig = 0; /* the knobs are free */
+        limits_changed();
+        host(line, 14);
+        later(2000);
+        read_at_home();
+        later(late_us);
+        uint8_t byte;
+        rig.guard.sealed = 0;
+        if (late_us == 7500) {
+            TEST_ASSERT_EQUAL(1, dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 1));
+            TEST_ASSERT_EQUAL('S', byte);
+        } else {
+            (void)dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 1);
+            expect_state(DR_GUARD_CHECKING);
+        }
+    }
+}
+
+static void a_motion_that_is_late_again_and_again_is_refused(void)
+{
+    armed();
+    rig.limits.rig = 0;
+    limits_changed();
+    host(line, 14);
+    later(2000);
+    for (unsigned late = 0; late <= 20; late++) {
+        expect_state(DR_GUARD_CHECKING);
+        (void)pull();
+        push(at_home, 14);
+        later(9000);
+        (void)dr_guard_pull_device(&rig.guard, guard_clock(), &(uint8_t){0}, 1);
+        later(0);
+    }
+    expect_state(DR_GUARD_IDLE);
+    expect_refused(DR_REASON_NO_POSITION);
+}
+
+/* A query that nobody has pulled was not asked: what the controller says then is no answer to it. */
+static void a_query_that_was_not_pulled_leaves_nothing_to_skip(void)
+{
+    armed();
+    host(line, 14);
+    later(2000); /* the query is there, and nobody takes it */
+    dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_STOP, true);
+    TEST_ASSERT_TRUE(pull());
+    push("\r", 1);
+    TEST_ASSERT_EQUAL(1, rig.guard.stop_crs);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -304,5 +360,8 @@ int main(void)
     RUN_TEST(damage_is_answered_by_one_ctrl_c);
     RUN_TEST(damage_within_a_frame_is_answered_by_silence);
     RUN_TEST(damage_forgets_no_torn_frame);
+    RUN_TEST(a_motion_leaves_in_time_or_is_read_for_again);
+    RUN_TEST(a_motion_that_is_late_again_and_again_is_refused);
+    RUN_TEST(a_query_that_was_not_pulled_leaves_nothing_to_skip);
     return UNITY_END();
 }
