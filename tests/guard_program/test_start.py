@@ -141,6 +141,7 @@ class Telling(unittest.TestCase):
         with emu.directory() as directory:
             conf = config_file(directory, rig(guard.MPC, keepouts=guard.POST, high=20000))
             for status, words, *args in (
+                    (0, ["allowed", "from a forbidden place (", "post", "'escape on'"], "--from", "2100,2500,100", "line 1500 2500 100 speed 3"),
                     (0, ["allowed", "straight within"], "--from", "0,0,0", "line 4000 100 0 speed 15"),
                     (4, ["refused (keep-out)", "post"], "--from", "0,0,0", "line 4000 4000 0 speed 15"),
                     (4, ["refused (limit)", "20,001.0 um", "20,000.0 um"], "--from", "0,0,0", "move 20001 0 0"),

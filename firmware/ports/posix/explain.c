@@ -376,6 +376,11 @@ static explain_result explain_split(FILE *out, const rig *r, const explain_scene
         (void)fprintf(out, "allowed\n");
     else
         (void)fprintf(out, "refused (%s): %s\n", guard_words_reason(verdict.reason), text);
+    const dr_verdict place = dr_judge_place(&r->limits, scene.drive, scene.start_steps);
+    if (has_way && verdict.reason == DR_REASON_NONE && place.reason != DR_REASON_NONE) {
+        (void)guard_words_verdict(text, sizeof text, r, &place);
+        (void)fprintf(out, "  from a forbidden place (%s): the guard is armed there with 'escape on'\n", text);
+    }
     if (has_way)
         print_way(out, r, &scene, &command, &request);
     return verdict.reason == DR_REASON_NONE ? EXPLAIN_ALLOWED : EXPLAIN_REFUSED;
