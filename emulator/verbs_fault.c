@@ -156,10 +156,6 @@ static bool do_fault(telling *t)
         return false;
     if (!read_when(t, &r) || !telling_ends(t))
         return false;
-    const uint64_t now_us = t->l->e->now_us;
-    if (r.until_us <= now_us)
-        return telling_wrong(t, "the clock shows %llu.%06u s already: it can never strike",
-                             (unsigned long long)(now_us / DR_US_PER_S), (unsigned)(now_us % DR_US_PER_S));
     faults_look(faults_of(t), t->s->ins.now_us, &t->s->ins.controller); /* the leg that has begun is spared */
     return faults_add(faults_of(t), &r) ||
            telling_wrong(t, "%u rules are all that there is room for; 'fault off' forgets them", FAULT_RULES);

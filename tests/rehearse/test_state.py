@@ -150,8 +150,8 @@ class Kept(Files):
             file.write(f'controllers = ( {{ name = "a"; controller = "mpc"; state = "{self.path}"; }},\n'
                        f'{{ name = "b"; controller = "mpc"; state = "{self.path}"; }} );')
         status, _, error = emu.outcome("rig", rig)
-        self.assertEqual(status, 1)
-        self.assertIn("another", error)
+        self.assertEqual(status, 2)
+        self.assertIn("'a' has it already", error)
 
     def test_run(self):
         for expected in ("0", "1"):
