@@ -5,6 +5,7 @@ controller, at any clock.
     test_clients.py --be STYLE trio|mpc          one of the programs, under `run`"""
 import os
 import queue
+import re
 import select
 import struct
 import subprocess
@@ -17,6 +18,10 @@ import serial
 
 PAUSE_S = 0.0025
 LONGEST_S = 60
+# The kernel carries bytes between the two sides of a pseudo-terminal by a worker of its own. Where that waits for a processor, a
+# pause looks shorter than it was, and nobody can know (docs/ci.md).
+PAUSES = {"hurried-command", "no-pause-in-s"}
+ATTEMPTS = 3
 
 
 class Blocking:
@@ -185,13 +190,19 @@ def talk(host):
 
 
 class Clients(unittest.TestCase):
+    maxDiff = None
+
     def keeps_the_rules(self, *command):
         for kind in ("trio", "mpc"):
             for clock in ("real", "jump"):
                 with self.subTest(f"{kind} {clock}"):
-                    done = subprocess.run([os.environ["DRYRIG_EMU"], "run", kind, "--clock", clock, "--strict", "--",
-                                           *(word.replace("KIND", kind) for word in command)],
-                                          capture_output=True, text=True, check=False, timeout=2 * LONGEST_S)
+                    for _ in range(ATTEMPTS):
+                        done = subprocess.run([os.environ["DRYRIG_EMU"], "run", kind, "--clock", clock, "--strict", "--",
+                                               *(word.replace("KIND", kind) for word in command)],
+                                              capture_output=True, text=True, check=False, timeout=2 * LONGEST_S)
+                        found = re.findall(r"^\d+ ([a-z0-9-]+), \d+ time", done.stderr, re.MULTILINE)
+                        if not found or not PAUSES.issuperset(found):
+                            break
                     self.assertEqual((0, ""), (done.returncode, done.stderr))
 
     def test_c_blocking(self):

@@ -41,8 +41,13 @@ class Port(unittest.TestCase):
         words = ["info", "move 100 200 50", "line 110 210 60 --speed 15", "home", "position"]
         if kind == "mpc":
             words[2] += " --stream"
-        subprocess.run([emu.PROGRAM, "run", kind, "--record", self.path, "--position", "160,160,160", *options, "--", "sh", "-ec",
-                        "\n".join(program + line for line in words)], check=True, capture_output=True, timeout=emu.LIMIT_S)
+        for _ in range(3):  # on a busy machine dryrig may give up waiting and ask again: that is another recording
+            done = subprocess.run([emu.PROGRAM, "run", kind, "--record", self.path, "--position", "160,160,160", "--strict", *options,
+                                   "--", "sh", "-ec", "\n".join(program + line for line in words)],
+                                  check=False, capture_output=True, timeout=emu.LIMIT_S)
+            if done.returncode == 0:
+                return
+        self.fail(done)
 
     def test_the_same_controller_gives_the_same_answers(self):
         for kind in STAGE:
