@@ -1,0 +1,233 @@
+/* Where motions end, and what follows from it. The test is the controller. */
+#include "bench.h"
+
+#include <string.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static dr_us guard_clock(void) { return (dr_us)(rig.clock_at_start + rig.now); }
+
+static void trio_says(uint32_t x) { device_at(x, 40000, 40000, 30); }
+
+static void mpc_says(uint32_t x)
+{
+    const uint8_t reply[] = {1, (uint8_t)x, (uint8_t)(x >> 8), (uint8_t)(x >> 16), 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1,
+                             0, DR_CR};
+    device_says(reply, sizeof reply);
+}
+
+static void says(uint32_t x)
+{
+    if (rig.limits.kind == DR_TRIO)
+        trio_says(x);
+    else
+        mpc_says(x);
+}
+
+static void arm_at(uint32_t x)
+{
+    bench_start();
+    run_us(1000000);
+    says(x);
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    says(x);
+    run_us(100000);
+    says(x);
+    expect_state(DR_GUARD_IDLE);
+}
+
+static void trio(uint16_t facts)
+{
+    bench_trio();
+    rig.by_hand = true;
+    rig.limits.rig = (uint16_t)(DR_RIG_KNOBS_LOCKED | facts);
+    arm_at(40000);
+}
+
+static void mpc(void)
+{
+    bench_mpc();
+    rig.by_hand = true;
+    arm_at(80000);
+}
+
+/* The motion that was asked for is read for, and leaves. */
+static void leaves(uint32_t from)
+{
+    run_us(2000);
+    says(from);
+    run_us(6000);
+    TEST_ASSERT_TRUE(status().state == DR_GUARD_MOVING_S || status().state == DR_GUARD_MOVING_U);
+}
+
+static void a_motion_that_has_not_moved_has_not_ended(void)
+{
+    trio(0);
+    host_axis('x', 40800);
+    leaves(40000);
+    run_us(20000);
+    device_says("\r", 1);
+    run_us(2000);
+    trio_says(40000);
+    run_us(100000);
+    trio_says(40000);
+    expect_fault(DR_FAULT_WRONG_END);
+    expect_silence();
+    TEST_ASSERT_TRUE(rig.guard.scene.old[0].is_open); /* its target stays possible */
+    TEST_ASSERT_EQUAL(40800 * 8, rig.guard.scene.old[0].target_q.min_q[DR_X]);
+}
+
+static void the_place_of_a_wrong_end_is_known(void)
+{
+    trio(0);
+    host_axis('x', 40800);
+    leaves(40000);
+    run_us(20000);
+    device_says("\r", 1);
+    run_us(2000);
+    trio_says(40400);
+    run_us(100000);
+    trio_says(40400);
+    expect_fault(DR_FAULT_WRONG_END);
+    TEST_ASSERT_EQUAL(40400, status().position_steps[DR_X]);
+}
+
+static void a_cr_while_it_still_moves_is_a_fault_at_once(void)
+{
+    trio(0);
+    host_line(15, 48000, 40000, 40000);
+    leaves(40000);
+    device_says("\r", 1);
+    run_us(2000);
+    trio_says(41000);
+    run_us(100000);
+    expect_fault(DR_FAULT_NONE);
+    trio_says(42000);
+    expect_fault(DR_FAULT_EARLY_CR);
+    expect_state(DR_GUARD_STOPPING);
+}
+
+static void without_y_only_homing_may_end(void)
+{
+    trio(DR_RIG_Y_LOCKED_OUT);
+    host_line(15, 40080, 40400, 40000);
+    leaves(40000);
+    run_us(20000);
+    device_says("\r", 1);
+    run_us(2000);
+    trio_says(40080);
+    run_us(100000);
+    trio_says(40080);
+    expect_fault(DR_FAULT_WRONG_END);
+}
+
+static void a_small_move_that_the_controller_ignores_has_no_cr(void)
+{
+    mpc();
+    host_point('M', 84000, 80000, 80000);
+    leaves(80000);
+    run_us(100000);
+    device_says("\r", 1);
+    run_us(2000);
+    mpc_says(84000);
+    expect_cr(); /* this one had */
+    host_point('M', 84005, 80000, 80000);
+    leaves(84000);
+    run_us(100000);
+    mpc_says(84000);
+    expect_state(DR_GUARD_IDLE);
+    expect_silence();
+    TEST_ASSERT_FALSE(rig.guard.scene.old[0].is_open); /* nothing was broken off */
+}
+
+static void the_end_of_a_motion_forgets_what_was_broken_off_on_every_drive(void)
+{
+    mpc();
+    for (uint8_t drive = 0; drive < DR_PORTS; drive++)
+        rig.guard.scene.old[drive] = (dr_old_move){
+            true, {80000, 80000, 80000}, {{80000 * 4, 80000 * 4, 80000 * 4}, {80000 * 4, 80000 * 4, 80000 * 4}}};
+    rig.guard.sealed = 0;
+    host_point('M', 84000, 80000, 80000);
+    leaves(80000);
+    run_us(100000);
+    device_says("\r", 1);
+    run_us(2000);
+    mpc_says(84000);
+    expect_cr();
+    for (uint8_t drive = 0; drive < DR_PORTS; drive++)
+        TEST_ASSERT_FALSE(rig.guard.scene.old[drive].is_open);
+}
+
+static void a_token_comes_back_50_ms_behind_the_first_motion(void)
+{
+    trio(0);
+    host_axis('x', 40008);
+    run_us(2000);
+    trio_says(40000);
+    const dr_us back = rig.guard.at[DR_TIMER_RATE];
+    TEST_ASSERT_EQUAL_UINT32(50000, back - guard_clock());
+    run_us(6000);
+    device_says("\r", 1);
+    run_us(2000);
+    trio_says(40008);
+    host_axis('x', 40016);
+    run_us(2000);
+    trio_says(40008);
+    expect_state(DR_GUARD_CHECKING);
+    TEST_ASSERT_EQUAL_UINT32(back, rig.guard.at[DR_TIMER_RATE]);
+}
+
+static void a_short_way_of_a_trio_is_no_small_move(void)
+{
+    trio(0);
+    host_axis('x', 40005);
+    run_us(2000);
+    trio_says(40000);
+    const uint32_t before = rig.wire_count;
+    for (unsigned i = 0; i < 5000 && rig.wire_count < before + 5; i++)
+        run_us(1);
+    TEST_ASSERT_EQUAL_UINT32(2000187, rig.guard.at[DR_TIMER_TASK] - guard_clock()); /* 0.625 um at 5 mm/s */
+}
+
+/* From beside 0,0,0: the frame names no target, so nobody can say that the way is short. */
+static void homing_is_never_a_small_move(void)
+{
+    static const uint8_t near_0[] = {1, 10, 0, 0, 0, 10, 0, 0, 0, 10, 0, 0, 0, 0x0D};
+    bench_mpc();
+    rig.by_hand = true;
+    rig.limits.drives[0].box_q = (dr_box){{0, 0, 0}, {UM(25000), UM(25000), UM(25000)}};
+    rig.limits.drives[0].max_move_q = (uint32_t)DR_FAR_Q;
+    bench_start();
+    run_us(1000000);
+    device_says(near_0, 14);
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    device_says(near_0, 14);
+    run_us(100000);
+    device_says(near_0, 14);
+    host_code('H');
+    run_us(2000);
+    device_says(near_0, 14);
+    run_us(2500);
+    expect_state(DR_GUARD_MOVING_S);
+    TEST_ASSERT_FALSE(rig.guard.small);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_motion_that_has_not_moved_has_not_ended);
+    RUN_TEST(the_place_of_a_wrong_end_is_known);
+    RUN_TEST(a_cr_while_it_still_moves_is_a_fault_at_once);
+    RUN_TEST(without_y_only_homing_may_end);
+    RUN_TEST(a_small_move_that_the_controller_ignores_has_no_cr);
+    RUN_TEST(the_end_of_a_motion_forgets_what_was_broken_off_on_every_drive);
+    RUN_TEST(a_token_comes_back_50_ms_behind_the_first_motion);
+    RUN_TEST(a_short_way_of_a_trio_is_no_small_move);
+    RUN_TEST(homing_is_never_a_small_move);
+    return UNITY_END();
+}
