@@ -180,6 +180,16 @@ static void row_03_half_spaces_too(void)
     ALLOWED(verdict_of('z', 0, 0, 0, 24009).reason);
 }
 
+static void row_03_a_line_beside_a_slanting_half_space_passes_though_its_hull_does_not(void)
+{
+    dr_obstacle *o = floor_below(0);
+    o->half_q = (dr_half){UM(10500), {1, 0, 1}}; /* x + z <= 10,500 um */
+    at(5000, 5000, 6000);
+    ALLOWED(judge('S', 6000, 5000, 5000)); /* x + z = 11,000 all the way */
+    REFUSED(DR_REASON_KEEP_OUT, judge('H', 6000, 5000, 5000));
+    REFUSED(DR_REASON_KEEP_OUT, judge('S', 5500, 5000, 5000));
+}
+
 static void row_04_home_order_and_work_order_sweep_different_boxes(void)
 {
     /* Home order: X and Z at the old Y, then Y. An obstacle at the old Y blocks it, not work order. */
@@ -925,6 +935,7 @@ int main(void)
     RUN_TEST(a_target_is_held_against_the_travel_of_the_drive_that_moves);
     RUN_TEST(row_03_a_line_through_a_keep_out_is_refused_to_the_quantum);
     RUN_TEST(row_03_half_spaces_too);
+    RUN_TEST(row_03_a_line_beside_a_slanting_half_space_passes_though_its_hull_does_not);
     RUN_TEST(row_04_home_order_and_work_order_sweep_different_boxes);
     RUN_TEST(row_05_either_order_of_x_and_z_may_collide);
     RUN_TEST(row_06_m_may_go_anywhere_in_its_hull);
