@@ -75,7 +75,9 @@ static void a_stop_within_a_line_keeps_its_target_possible(void)
 static void a_stop_within_a_setting_breaks_no_motion_off(void)
 {
     armed(DR_TRIO, 0);
-    host_value('A', 45); /* its first byte is on the line */
+    run_us(1000);
+    host_value('A', 45);
+    TEST_ASSERT_EQUAL(1, rig.guard.out_at); /* its first byte is on the line */
     stop_input(true);
     run_us(1000);
     device_says("\r\r", 2);

@@ -50,8 +50,11 @@ static void line_is_read_for(void)
 static void a_cable_pulled_at_rest_or_within_a_setting_breaks_no_motion_off(void)
 {
     armed(0, DR_HOST_LOSS_STOP);
+    run_us(1000);
     host_value('A', 45);
+    TEST_ASSERT_EQUAL(1, rig.guard.out_at);
     cables(true, false);
+    expect_fault(DR_FAULT_TORN);
     TEST_ASSERT_FALSE(rig.guard.scene.old[0].is_open);
     armed(0, DR_HOST_LOSS_STOP);
     line_is_read_for();

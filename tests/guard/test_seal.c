@@ -199,11 +199,11 @@ static void what_a_late_caller_finds_is_logged_with_the_instant_when_it_was_due(
 /* -- What is left when the seal is broken ------------------------------------------------------------------------------- */
 
 /* As it is now, but for one bit of a counter that decides nothing; and what the guard makes of it. */
-static void break_seal(bool torn)
+static void break_seal_at(bool torn, uint8_t *byte)
 {
     dr_guard_push_host(&rig.guard, guard_clock(), NULL, 0);
     SEALED();
-    rig.guard.forwarded ^= 0x100;
+    *byte = (uint8_t)(*byte == 0);
     expect_state(DR_GUARD_LOCKED); /* at once, by who only looks */
     expect_fault(DR_FAULT_DAMAGED);
     TEST_ASSERT_EQUAL(DR_NEEDS_LIMITS, status().needs);
@@ -223,6 +223,8 @@ static void break_seal(bool torn)
     host("\x03", 1); /* ^C passes, unless it might complete a frame */
     TEST_ASSERT_EQUAL(torn ? 0 : 1, dr_guard_pull_device(&rig.guard, guard_clock(), bytes, sizeof bytes));
 }
+
+static void break_seal(bool torn) { break_seal_at(torn, (uint8_t *)&rig.guard.forwarded); }
 
 static void damage_is_answered_by_one_ctrl_c(void)
 {
@@ -285,10 +287,11 @@ static void damage_forgets_no_torn_frame(void)
     for (unsigned i = 0; i < 3; i++) {
         started();
         read_at_home();
+        rig.guard.torn = 1;
         rig.guard.sealed = 0;
-        rig.guard.torn = i != 1;
-        rig.guard.fault = i == 0 ? DR_FAULT_NONE : DR_FAULT_TORN;
-        break_seal(true);
+        dr_guard_push_host(&rig.guard, guard_clock(), NULL, 0); /* found: as unplugged */
+        expect_fault(DR_FAULT_TORN);
+        break_seal_at(true, i == 0 ? &rig.guard.torn : i == 1 ? &rig.guard.fault : (uint8_t *)&rig.guard.forwarded);
     }
 }
 
