@@ -219,7 +219,8 @@ typedef struct {
     uint8_t path_drive;
     bool end_told, small; /* the motion's CR is there; so short that it may never come */
     bool counted;         /* as a motion that was allowed */
-    uint8_t late;         /* how often its reading was too old when it should have left */
+    uint8_t late;         /* how often it was read again: too old when it should have left, or doubted */
+    bool doubted;         /* its place was news: two readings were asked for */
     uint8_t tokens;       /* motions that may start now */
     uint8_t noise, quarantined[DR_RECORD_TEXT], quarantined_count;
 

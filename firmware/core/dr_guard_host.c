@@ -71,6 +71,7 @@ static void take_frame(dr_guard *g, dr_us now, const dr_command *command, const 
         g->command = *command;
         g->request = request;
         g->late = 0;
+        g->doubted = false;
         g->counted = false;
         memcpy(g->frame, frame, (size_t)1u + command->args);
         g->task = TASK_CHECK;

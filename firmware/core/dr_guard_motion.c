@@ -37,13 +37,30 @@ static bool is_small(const dr_guard *g)
     return true;
 }
 
+static void read_again(dr_guard *g, dr_us now)
+{
+    if (++g->late > LATE_MAX) {
+        dr_g_end_task(g);
+        dr_g_refuse_pending(g, now, dr_g_because(DR_REASON_NO_POSITION));
+        return;
+    }
+    g->task = TASK_CHECK;
+    dr_g_start_reading(g, now, 0);
+}
+
 void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply)
 {
     const bool jumped = dr_g_has_jumped(g, now, reply);
+    const dr_news news = dr_g_news(g, reply);
     dr_g_know_place(g, now, reply);
     if (jumped) {
         dr_g_refuse_pending(g, now, dr_g_because(DR_REASON_NO_POSITION));
         dr_g_fail(g, now, DR_FAULT_POSITION_JUMP);
+        return;
+    }
+    if (news == NEWS_OTHER || (news == NEWS_MOVED && !g->doubted)) {
+        g->doubted = true;
+        read_again(g, now);
         return;
     }
     g->scene.may_calibrate = is_on(g, DR_INPUT_MAY_CALIBRATE);
@@ -87,12 +104,7 @@ void dr_g_check_again(dr_guard *g, dr_us now)
 {
     dr_g_withdraw(g);
     dr_g_end_task(g);
-    if (++g->late > LATE_MAX) {
-        dr_g_refuse_pending(g, now, dr_g_because(DR_REASON_NO_POSITION));
-        return;
-    }
-    g->task = TASK_CHECK;
-    dr_g_start_reading(g, now, 0);
+    read_again(g, now);
 }
 
 /* Where the motion may rightly end: at its target; without Y where homing leaves it out; where it began, if it was so short

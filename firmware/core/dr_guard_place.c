@@ -84,6 +84,15 @@ bool dr_g_has_jumped(const dr_guard *g, dr_us now, const dr_reply *reply)
     return false;
 }
 
+/* A reading has no check sum: what is news may be a knob, or a bit that was flipped on the line. It is believed when the next
+ * reading says the same, or as much as a knob can have changed in between. */
+dr_news dr_g_news(const dr_guard *g, const dr_reply *reply)
+{
+    if (reply->value != (kind_of(g) == DR_TRIO ? g->scene.angle_deg : g->scene.drive + 1u))
+        return NEWS_OTHER;
+    return same_place(g->scene.start_steps, reply->steps) ? NEWS_NONE : NEWS_MOVED;
+}
+
 /* The first of two readings is kept, the second compared. False: it was the first, a second was asked for. */
 bool dr_g_has_two(dr_guard *g, dr_us now, const dr_reply *reply, bool *agree)
 {

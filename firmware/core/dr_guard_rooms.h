@@ -47,6 +47,8 @@ typedef enum {
     READ_QUIETS /* after nonsense: 100 ms without a byte, then once more */
 } dr_read_phase;
 
+typedef enum { NEWS_NONE, NEWS_MOVED, NEWS_OTHER /* angle or drive */ } dr_news;
+
 #define MS(ms) ((dr_us)(ms)*1000u)
 #define FRAME_GAP_US MS(2)   /* between two frames to the controller */
 #define LINE_PAUSE_US MS(35) /* within the 'S' of an MPC-200: 30 ms [M note 10], and some */
@@ -122,6 +124,7 @@ void dr_g_end_task(dr_guard *g);
 uint32_t dr_g_apart(uint32_t a, uint32_t b);
 bool dr_g_is_plausible(const dr_guard *g, const uint8_t *bytes, dr_reply *reply);
 bool dr_g_has_jumped(const dr_guard *g, dr_us now, const dr_reply *reply);
+dr_news dr_g_news(const dr_guard *g, const dr_reply *reply); /* against what is known */
 bool dr_g_has_two(dr_guard *g, dr_us now, const dr_reply *reply, bool *agree);
 bool dr_g_is_at(const dr_guard *g, const dr_reply *reply, const dr_box *target_q); /* of the drive that moved last */
 void dr_g_know_place(dr_guard *g, dr_us now, const dr_reply *reply);

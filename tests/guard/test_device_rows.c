@@ -322,6 +322,91 @@ static void row_45_impossible_drives(void)
     }
 }
 
+/* X of the next position reply arrives with one bit flipped: 80,000 is read as 96,384. */
+static uint32_t flips_at;
+static int flip_x(bench *b, uint8_t byte) { return b->said == flips_at ? byte ^ 0x40 : byte; }
+
+static void row_45_a_flipped_bit_in_a_reading_lets_no_motion_through_an_obstacle(void)
+{
+    bench_mpc();
+    rig.limits.rig = 0; /* a knob could have moved it there */
+    keep_out(5100, 5200, 0, 25000, 0, 25000);
+    bench_start();
+    bench_arm();
+    run_ms(5000);
+    flips_at = rig.said + 3; /* drive, X's lowest byte, this one */
+    rig.spoil = flip_x;
+    host_point('M', 96000, 80000, 80000);
+    run_ms(3000);
+    expect_silence();
+    expect_refused(DR_REASON_NO_POSITION);
+    expect_fault(DR_FAULT_POSITION_JUMP);
+    expect_tip(0, 80000, 80000, 80000);
+}
+
+static void row_58_a_knob_that_is_being_turned_is_read_twice(void)
+{
+    bench_trio();
+    rig.limits.rig = 0;
+    rig.by_hand = true;
+    bench_start();
+    run_ms(1000);
+    device_at(40000, 40000, 40000, 30);
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    for (int reading = 0; reading < 2; reading++) {
+        run_ms(102);
+        device_at(40000, 40000, 40000, 30);
+    }
+    host_axis('x', 41000);
+    run_ms(4);
+    device_at(40100, 40000, 40000, 30);
+    expect_state(DR_GUARD_CHECKING);
+    run_ms(4);
+    device_at(40110, 40000, 40000, 30); /* 1.25 um on: as a knob can */
+    run_ms(5);
+    expect_state(DR_GUARD_MOVING_U);
+}
+
+static void row_45_an_angle_that_is_news_is_read_until_two_agree(void)
+{
+    bench_trio();
+    rig.by_hand = true;
+    bench_start();
+    run_ms(1000);
+    device_at(40000, 40000, 40000, 30);
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    for (int reading = 0; reading < 2; reading++) {
+        run_ms(102);
+        device_at(40000, 40000, 40000, 30);
+    }
+    expect_state(DR_GUARD_IDLE);
+    host_axis('x', 40100);
+    for (unsigned angle = 31; angle <= 33; angle++) { /* somebody turns the knob */
+        run_ms(4);
+        device_at(40000, 40000, 40000, angle);
+        expect_state(DR_GUARD_CHECKING);
+    }
+    run_ms(4);
+    device_at(40000, 40000, 40000, 33);
+    run_ms(5);
+    expect_state(DR_GUARD_MOVING_U);
+    device_says("\r", 1);
+    run_ms(4);
+    device_at(40100, 40000, 40000, 33);
+    expect_cr();
+    host_axis('x', 40200);
+    for (unsigned angle = 34; angle <= 54; angle++) { /* and goes on turning: 20 readings, and no more */
+        expect_state(DR_GUARD_CHECKING);
+        run_ms(4);
+        device_at(40100, 40000, 40000, angle);
+    }
+    expect_refused(DR_REASON_NO_POSITION);
+    expect_state(DR_GUARD_IDLE);
+    expect_silence();
+}
+
 static void row_46_small_moves_may_be_ignored(void)
 {
     for (unsigned quirk = 0; quirk < 2; quirk++)
@@ -1195,6 +1280,9 @@ int main(void)
     RUN_TEST(row_44_a_0x0d_within_a_coordinate_ends_nothing);
     RUN_TEST(row_44_a_host_gets_nonsense_and_the_guard_asks_itself);
     RUN_TEST(row_45_impossible_drives);
+    RUN_TEST(row_45_a_flipped_bit_in_a_reading_lets_no_motion_through_an_obstacle);
+    RUN_TEST(row_58_a_knob_that_is_being_turned_is_read_twice);
+    RUN_TEST(row_45_an_angle_that_is_news_is_read_until_two_agree);
     RUN_TEST(row_46_small_moves_may_be_ignored);
     RUN_TEST(row_47_an_end_elsewhere);
     RUN_TEST(row_47_y_that_is_locked_out_of_homing_is_no_wrong_end);

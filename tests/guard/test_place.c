@@ -226,6 +226,8 @@ static void each_drive_is_held_against_its_own_place(void)
     mpc_says(1, DR_X, 80000);
     host_point('M', 80000, 80100, 80000);
     run_us(2000);
+    mpc_says(2, DR_X, 90000); /* which is news: read twice */
+    run_us(4000);
     mpc_says(2, DR_X, 90000);
     expect_fault(DR_FAULT_NONE);
     expect_refused(DR_REASON_DRIVE);
