@@ -458,7 +458,7 @@ def judge(arguments, results, equivalents, wrong):
     counts = {}
     for _, mutant, fate in results:
         counts[fate] = counts.get(fate, 0) + 1
-        if fate != 'survived' and mutant.key in equivalents:
+        if fate not in ('survived', 'identical') and mutant.key in equivalents:
             wrong.append(f'is {fate}: {" | ".join(mutant.key)}')
     survived = [mutant for _, mutant, fate in results if fate == 'survived']
     left = [mutant for mutant in survived if mutant.key not in equivalents]
