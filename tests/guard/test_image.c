@@ -48,7 +48,7 @@ static dr_obstacle *obstacle(uint8_t shape)
     memset(o, 0, sizeof *o);
     o->shape = shape;
     o->box_q = (dr_box){{UM(1000), UM(1000), UM(1000)}, {UM(2000), UM(2000), UM(2000)}};
-    o->half_q = (dr_half){shape == DR_SHAPE_HALF ? UM(1000) : 0, {0, 0, shape == DR_SHAPE_HALF}};
+    o->half_q = (dr_half){shape == DR_SHAPE_HALF ? UM(1000) : 0, {0, 0, (int16_t)(shape == DR_SHAPE_HALF)}};
     return o;
 }
 
