@@ -159,7 +159,11 @@ class Telling(unittest.TestCase):
             for words, *args in ((["no such command", "line", "move"], "--from", "0,0,0", "fly 1 2 3"),
                                  (["where from?"], "move 1 2 3"),
                                  (["where from?"], "--from", "1,2", "move 1 2 3"),
+                                 (["where from?"], "--from", "nan,2,3", "move 1 2 3"),
                                  (["a coordinate is missing"], "--from", "1,2,3", "move 1 2"),
+                                 (["is no number"], "--from", "1,2,3", "move 1 2 0x10"),
+                                 (["is no number"], "--from", "1,2,3", "move 1 2 1e3"),
+                                 (["a whole number"], "--from", "1,2,3", "line 1 2 3 speed 8.5"),
                                  (["something behind"], "--from", "1,2,3", "move 1 2 3 4"),
                                  (["'speed' and its level"], "--from", "1,2,3", "line 1 2 3"),
                                  (["drive 2 is not in the configuration"], "--drive", "2", "--from", "1,2,3", "move 1 2 3")):

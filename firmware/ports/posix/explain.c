@@ -248,13 +248,17 @@ typedef struct {
     unsigned count, next;
 } line;
 
+/* A decimal number at the text's beginning: strtod() would take "nan" and "0x10" as well. False: there is none. */
+static bool take_number(const char *text, char **end, double *out)
+{
+    *out = strtod(text, end);
+    return *end != text && (size_t)(*end - text) <= strspn(text, "+-.0123456789") && *out >= -1e6 && *out <= 1e6;
+}
+
 static bool read_number(const char *text, double *out)
 {
     char *end;
-    if (text == NULL)
-        return false;
-    *out = strtod(text, &end);
-    return end != text && *end == '\0' && *out >= -1e6 && *out <= 1e6;
+    return text != NULL && take_number(text, &end, out) && *end == '\0';
 }
 
 static const char *next_word(line *l) { return l->next < l->count ? l->words[l->next++] : NULL; }
@@ -307,8 +311,8 @@ static bool read_motion(line *words, const rig *r, uint8_t quanta_per_step, dr_c
             return is_wrong(why, room, r, "'speed' and its level are missing");
     }
     if (command->args == DR_ARGS_LINE || command->args == DR_ARGS_BYTE) {
-        if (!read_number(next_word(words), &number) || number < 0 || number > 255)
-            return is_wrong(why, room, r, "a number from 0 to 255 is missing");
+        if (!read_number(next_word(words), &number) || number < 0 || number > 255 || number != floor(number))
+            return is_wrong(why, room, r, "a whole number from 0 to 255 is missing");
         request->value = (uint8_t)number;
     }
     return next_word(words) == NULL || is_wrong(why, room, r, "there is something behind the command");
@@ -319,8 +323,8 @@ static bool read_from(const char *text, uint8_t quanta_per_step, uint32_t steps[
     const char *at = text;
     for (unsigned axis = 0; axis < DR_AXES; axis++) {
         char *end;
-        const double number = strtod(at, &end);
-        if (end == at || number < 0 || number > 1e6 || *end != (axis + 1u < DR_AXES ? ',' : '\0'))
+        double number;
+        if (!take_number(at, &end, &number) || number < 0 || *end != (axis + 1u < DR_AXES ? ',' : '\0'))
             return false;
         steps[axis] = to_steps(number, quanta_per_step);
         at = end + 1;
