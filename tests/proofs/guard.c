@@ -182,8 +182,6 @@ static void valid_task(bool asserted)
         HOLDS(!g.stop_latched && g.mode == MODE_DISARMED);
     if (g.task == TASK_ARM || moves)
         HOLDS(g.proved);
-    if (g.task == TASK_RECHECK)
-        HOLDS(g.proved || g.ambiguous);
     if (g.read_phase != READ_OFF)
         HOLDS(g.task != TASK_NONE && g.task != TASK_PASS && g.task != TASK_SEND && g.task != TASK_MOVE);
     if (g.read_phase == READ_SENT)
