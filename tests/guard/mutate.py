@@ -385,11 +385,13 @@ def commit_of_core():
     return git('log', '-1', '--format=%h', '--', 'firmware/core') + (' and changes that are not committed' if git('status', '--short', '--', 'firmware/core') else '')
 
 
-def report(path, results, equivalents, lines):
+def report(path, results, equivalents, lines, is_quick):
     files = sorted({mutant.file for _, mutant, _ in results})
     classes = ('killed', 'crashed', 'timeout', 'survived', 'identical', 'stillborn')
     out = ['# Mutation testing of the guard\'s core', '',
            f'Written by `tests/guard/mutate.py` on {datetime.now(timezone.utc):%Y-%m-%d}; `firmware/core` as of commit {commit_of_core()}.',
+           *(['A first look (--quick): without sanitizers and without tests of more than 0.1 s, which find some of the survivors.']
+             if is_quick else []),
            'What is changed and what the classes mean stands at the head of `mutants.py` and of `mutate.py`.', '', *lines, '',
            '| file | ' + ' | '.join(classes) + ' | of the survivors argued |', '|---' * (len(classes) + 2) + '|']
     for file in files + ['all']:
@@ -475,7 +477,7 @@ def judge(arguments, results, equivalents, wrong):
     for error in wrong:
         print(f'mutate: equivalents.txt: {error}', file=sys.stderr)
     if arguments.report:
-        report(arguments.report, results, equivalents, lines)
+        report(arguments.report, results, equivalents, lines, arguments.quick)
     gate = GATE_OF_SAMPLE if arguments.sample else GATE
     return 0 if found * 100 >= gate * unargued and not wrong else 1
 
