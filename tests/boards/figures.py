@@ -3,8 +3,8 @@ core's calls in cycles (AVR, simavr) and instructions (Cortex-M3, QEMU). All of 
 
     figures.py BUILDS --avr-board PROGRAM --qemu PROGRAM [--report FILE] [--update]
 
-Compares with figures.txt beside this file: no figure may be more than 3 % above it. --update writes what was measured:
-commit it with the change that is the reason, and say why. BUILDS holds one build directory for each board.
+Compares with figures.txt beside this file: no figure may be more than 3 % above it (stack seen: 20 %). --update writes
+what was measured: commit it with the change that is the reason, and say why. BUILDS holds one build directory for each board.
 """
 import argparse
 import re
@@ -14,6 +14,7 @@ from pathlib import Path
 
 COMMITTED = Path(__file__).with_name("figures.txt")
 MARGIN = 1.03
+MARGIN_STACK_SEEN = 1.2  # an interrupt comes at the deepest call, or not
 KINDS = ("trio", "mpc")
 WITH_HANDS = ("trio", "mpc", "trio-hands", "mpc-hands")
 IMAGES = [("avr-uno", "uno", "atmega328p", WITH_HANDS), ("avr-mega", "mega", "atmega2560", WITH_HANDS),
@@ -161,7 +162,7 @@ def main():
         is_now, was = measured.get(name), committed.get(name)
         if is_now is None or was is None:
             problems.append(f"{name}: {'not measured any more' if is_now is None else 'not in figures.txt'}")
-        elif is_now > was * MARGIN:
+        elif is_now > was * (MARGIN_STACK_SEEN if name.endswith("stack-seen") else MARGIN):
             problems.append(f"{name}: {is_now}, committed {was}")
     if arguments.report:
         arguments.report.parent.mkdir(exist_ok=True)
