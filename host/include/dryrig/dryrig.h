@@ -87,7 +87,7 @@ typedef enum {
     DRYRIG_ERR_TIMEOUT = -21,     /* no answer in time */
     DRYRIG_ERR_GARBLED = -22,     /* an answer, but not a documented one */
     DRYRIG_ERR_OUT_OF_STEP = -23, /* could not get back in step; see dryrig_resync() */
-    DRYRIG_ERR_REFUSED = -24, /* the controller says no (an absent drive, an angle that it did not take), or a guard */
+    DRYRIG_ERR_REFUSED = -24,     /* the controller says no (an absent drive, an angle not taken), or a guard does */
     DRYRIG_ERR_STOOD_STILL = -25, /* the controller answered a move, or ignored it, and nothing moved */
     DRYRIG_ERR_ELSEWHERE = -26,   /* the move ended, but not at its target */
     DRYRIG_ERR_CHANGING = -27,    /* the position is not the same twice: a knob is turned, or something moves */
