@@ -151,8 +151,9 @@ static void valid_mode(bool asserted)
         HOLDS(!g.proved);
     if (g.proved || g.ambiguous)
         HOLDS(g.device_present);
-    if (g.torn)
-        HOLDS(!g.device_present && g.stops_out == 0 && g.out_at == g.out_count);
+    if (g.torn && !g.device_present &&
+        g.limits != NULL) /* present: found within this call, whose end() does the rest */
+        HOLDS(g.stops_out == 0 && g.out_at == g.out_count);
     if (first || second)
         HOLDS(g.stop_latched && !is_running(&g, DR_TIMER_RELEASE));
     if (is_running(&g, DR_TIMER_WIRING))
@@ -223,7 +224,10 @@ static void valid_timers(bool asserted)
     if (is_running(&g, DR_TIMER_TASK))
         HOLDS((g.task == TASK_PROVE && g.read_phase == READ_OFF) || g.task == TASK_PASS || g.task == TASK_MOVE ||
               g.task == TASK_STOP);
-    HOLDS(is_running(&g, DR_TIMER_READ) == (g.read_phase != READ_OFF));
+    if (is_running(&g, DR_TIMER_READ))
+        HOLDS(g.read_phase != READ_OFF);
+    else if (!g.torn)
+        HOLDS(g.read_phase == READ_OFF);
     if (is_running(&g, DR_TIMER_PROOF) || is_running(&g, DR_TIMER_REPEAT))
         HOLDS(g.task == TASK_STOP);
     if (is_running(&g, DR_TIMER_IDLE))
@@ -381,13 +385,13 @@ void proof_pulled_byte(void)
     any_guard();
     const size_t count = dr_guard_pull_device(&g, now, &byte, 1);
     valid(true);
-    assert(count == 0 || !before.torn);
+    assert(count == 0 || !before.torn || before.device_present || before.limits == NULL);
     if (count == 0) {
         assert(before.out_at == before.out_ready ||
                (before.task == TASK_SEND && before.out_at == 0)); /* read for too long ago */
         assert(before.stops_out == 0 || was_leaving());
     } else if (was_leaving()) {
-        assert(byte == before.out[before.out_at] && g.out_at == before.out_at + 1u);
+        assert(byte == before.out[before.out_at] && (before.torn || g.out_at == before.out_at + 1u));
     } else if (before.stops_out > 0) {
         assert(byte == DR_INTERRUPT);
     } else {
