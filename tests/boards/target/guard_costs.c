@@ -6,8 +6,6 @@
 
 #include <string.h>
 
-int target_main(void);
-
 #define RECORDS 16u
 
 static dr_limits limits;
