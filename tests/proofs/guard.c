@@ -410,6 +410,6 @@ void proof_bytes_for_the_host(void)
     any_guard();
     (void)dr_guard_pull_host(&g, now, bytes, 2);
     check();
-    assert(danger(&g) == danger(&before));
+    assert(danger(&g) <= danger(&before)); /* a torn frame may have been found */
     proved();
 }
