@@ -344,10 +344,9 @@ static void row_45_a_flipped_bit_in_a_reading_lets_no_motion_through_an_obstacle
     expect_tip(0, 80000, 80000, 80000);
 }
 
-static void row_58_a_knob_that_is_being_turned_is_read_twice(void)
+/* The test is a TRIO at 40,000 on each axis and 30 degrees. */
+static void arm_at_40000_by_hand(void)
 {
-    bench_trio();
-    rig.limits.rig = 0;
     rig.by_hand = true;
     bench_start();
     run_ms(1000);
@@ -358,6 +357,13 @@ static void row_58_a_knob_that_is_being_turned_is_read_twice(void)
         run_ms(102);
         device_at(40000, 40000, 40000, 30);
     }
+}
+
+static void row_58_a_knob_that_is_being_turned_is_read_twice(void)
+{
+    bench_trio();
+    rig.limits.rig = 0;
+    arm_at_40000_by_hand();
     host_axis('x', 41000);
     run_ms(4);
     device_at(40100, 40000, 40000, 30);
@@ -371,16 +377,7 @@ static void row_58_a_knob_that_is_being_turned_is_read_twice(void)
 static void row_45_an_angle_that_is_news_is_read_until_two_agree(void)
 {
     bench_trio();
-    rig.by_hand = true;
-    bench_start();
-    run_ms(1000);
-    device_at(40000, 40000, 40000, 30);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    for (int reading = 0; reading < 2; reading++) {
-        run_ms(102);
-        device_at(40000, 40000, 40000, 30);
-    }
+    arm_at_40000_by_hand();
     expect_state(DR_GUARD_IDLE);
     host_axis('x', 40100);
     for (unsigned angle = 31; angle <= 33; angle++) { /* somebody turns the knob */
