@@ -155,22 +155,29 @@ class Rig:
 
     def flip(self, pattern):
         """Flips a bit in memory where these bytes are found first, by QEMU's debugger port, which stands still meanwhile."""
-        line = self.connect("gdb")
+        waiting = b""
+
+        def packet():
+            nonlocal waiting
+            while not (found := re.search(rb"\$([^#]*)#..", waiting, re.DOTALL)):
+                more = line.recv(65536)
+                assert more, "the debugger's port has closed"
+                waiting += more
+            line.sendall(b"+")
+            waiting = waiting[found.end():]
+            return found.group(1)
 
         def command(text):
             line.sendall(b"$" + text + b"#%02x" % (sum(text) & 0xFF))
-            answer = b""
-            while not re.search(rb"\$[^#]*#..$", answer):
-                answer += line.recv(65536)
-            line.sendall(b"+")
-            return re.search(rb"\$([^#]*)#..$", answer).group(1)
+            while (answer := packet())[:1] in b"ST":  # stop reports come unasked as well
+                pass
+            return answer
 
-        command(b"?")
-        memory = b"".join(bytes.fromhex(command(b"m%x,400" % at).decode()) for at in range(0x20000000, 0x20002000, 0x400))
-        at = 0x20000000 + memory.index(pattern)
-        assert command(b"M%x,1:%02x" % (at, pattern[0] ^ 1)) == b"OK"
-        command(b"D")
-        line.close()
+        with self.connect("gdb") as line:
+            memory = b"".join(bytes.fromhex(command(b"m%x,400" % at).decode()) for at in range(0x20000000, 0x20002000, 0x400))
+            at = 0x20000000 + memory.index(pattern)
+            assert command(b"M%x,1:%02x" % (at, pattern[0] ^ 1)) == b"OK"
+            assert command(b"D") == b"OK"
 
 
 LOCKED, DISARMED, IDLE, FAULT, STOPPED = 0, 1, 2, 7, 8  # dr_guard_state
