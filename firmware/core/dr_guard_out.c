@@ -87,6 +87,7 @@ static bool may_send(dr_guard *g)
         return true;
     }
     g->torn = true;
+    g->stops_out = 0; /* of a host that asked before the cable was in */
     return false;
 }
 

@@ -1244,6 +1244,22 @@ static void a_controller_that_says_something_is_not_torn(void)
     TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
 }
 
+/* The ^C that a host asked for while the cable was out are counted too; when there are too many, the waiting ones do not leave. */
+static void what_waits_for_a_torn_controller_is_forgotten(void)
+{
+    uint8_t bytes[16];
+    bench_mpc();
+    dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64);
+    dr_guard_start(&rig.guard, 0, DR_START_POWER_ON);
+    dr_guard_link(&rig.guard, 0, true, false);
+    for (unsigned i = 0; i < 11; i++)
+        dr_guard_push_host(&rig.guard, 0, (const uint8_t *)"\x03", 1);
+    TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+    dr_guard_push_host(&rig.guard, 0, (const uint8_t *)"\x03", 1);
+    TEST_ASSERT_TRUE(dr_guard_is_mid_frame(&rig.guard));
+    TEST_ASSERT_EQUAL(0, dr_guard_pull_device(&rig.guard, 0, bytes, sizeof bytes));
+}
+
 /* One that has been proved hears each ^C, answered or not. */
 static void a_controller_that_is_proved_is_told_to_stop_as_often_as_wanted(void)
 {
@@ -1261,6 +1277,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(row_74_nobody_completes_an_s_that_nobody_remembers);
     RUN_TEST(a_controller_that_says_something_is_not_torn);
+    RUN_TEST(what_waits_for_a_torn_controller_is_forgotten);
     RUN_TEST(a_controller_that_is_proved_is_told_to_stop_as_often_as_wanted);
     RUN_TEST(the_controller_to_order_works_when_nothing_is_ordered);
     RUN_TEST(row_74_a_reset_within_a_frame_leaves_nothing_that_completes_it);
