@@ -511,6 +511,43 @@ void device_at(uint32_t x, uint32_t y, uint32_t z, unsigned last)
     device_says(reply, 14);
 }
 
+void device_at_drive(unsigned drive, uint32_t x, uint32_t y, uint32_t z)
+{
+    uint8_t reply[14] = {(uint8_t)drive};
+    put_u32(put_u32(put_u32(reply + 1, x), y), z);
+    reply[13] = 0x0D;
+    device_says(reply, 14);
+}
+
+void device_at_home(void)
+{
+    if (rig.limits.kind == DR_TRIO)
+        device_at(40000, 40000, 40000, 30);
+    else
+        device_at_drive(1, 80000, 80000, 80000);
+}
+
+void bench_start_by_hand(void (*says)(void))
+{
+    rig.by_hand = true;
+    bench_start();
+    run_us(1000000);
+    says();
+    expect_state(DR_GUARD_DISARMED);
+}
+
+/* ARM is followed by two readings: at once, and 100 ms later. */
+void bench_arm_by_hand(void (*says)(void))
+{
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    run_us(2000);
+    says();
+    run_us(100000);
+    says();
+    expect_state(DR_GUARD_IDLE);
+}
+
 int wire_next(void) { return rig.wire_taken < rig.wire_count ? rig.wire[rig.wire_taken++] : -1; }
 
 /* ^C outside frames: told apart as the controller would. */

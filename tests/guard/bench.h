@@ -106,7 +106,12 @@ void clear_fault(void);   /* key off and on */
 
 /* The test as the controller. */
 void device_says(const void *bytes, size_t count);
-void device_at(uint32_t x, uint32_t y, uint32_t z, unsigned last); /* a TRIO's position reply */
+void device_at(uint32_t x, uint32_t y, uint32_t z, unsigned last);        /* a TRIO's position reply */
+void device_at_drive(unsigned drive, uint32_t x, uint32_t y, uint32_t z); /* an MPC-200's */
+void device_at_home(void);                                                /* of either: 5 mm on each axis, drive 1 */
+/* As bench_start() and bench_arm(), with the test as a controller that stands where `says` says. */
+void bench_start_by_hand(void (*says)(void));
+void bench_arm_by_hand(void (*says)(void));
 /* The next byte that the guard sent; -1: none. */
 int wire_next(void);
 /* How many bytes of this value, frames of this code, the guard has sent so far. */

@@ -1,27 +1,12 @@
 /* What is broken off, and what is remembered of it. The test is the controller. */
 #include "bench.h"
 
-#include <string.h>
-
 void setUp(void) {}
 void tearDown(void) {}
 
 static void trio_says(uint32_t x) { device_at(x, 40000, 40000, 30); }
 
-static void mpc_says(uint8_t drive, uint32_t x)
-{
-    const uint8_t reply[] = {
-        drive, (uint8_t)x, (uint8_t)(x >> 8), (uint8_t)(x >> 16), 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, DR_CR};
-    device_says(reply, sizeof reply);
-}
-
-static void says_home(void)
-{
-    if (rig.limits.kind == DR_TRIO)
-        trio_says(40000);
-    else
-        mpc_says(1, 80000);
-}
+static void mpc_says(uint8_t drive, uint32_t x) { device_at_drive(drive, x, 80000, 80000); }
 
 static void armed(dr_kind kind, uint16_t facts)
 {
@@ -29,18 +14,9 @@ static void armed(dr_kind kind, uint16_t facts)
         bench_trio();
     else
         bench_mpc();
-    rig.by_hand = true;
     rig.limits.rig = (uint16_t)(DR_RIG_KNOBS_LOCKED | facts);
-    bench_start();
-    run_us(1000000);
-    says_home();
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_us(2000);
-    says_home();
-    run_us(100000);
-    says_home();
-    expect_state(DR_GUARD_IDLE);
+    bench_start_by_hand(device_at_home);
+    bench_arm_by_hand(device_at_home);
 }
 
 static void rest_at(void (*says)(void))
@@ -59,7 +35,7 @@ static void a_stop_within_a_line_keeps_its_target_possible(void)
     armed(DR_MPC, 0);
     host_line(15, 84000, 80000, 80000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(12000); /* in the pause behind the second byte */
     host_code(3);
     run_us(30000);
@@ -81,7 +57,7 @@ static void a_stop_within_a_setting_breaks_no_motion_off(void)
     stop_input(true);
     run_us(1000);
     device_says("\r\r", 2);
-    rest_at(says_home);
+    rest_at(device_at_home);
     expect_state(DR_GUARD_STOPPED);
     TEST_ASSERT_FALSE(rig.guard.scene.old[0].is_open);
 }
@@ -91,7 +67,7 @@ static void a_motion_that_cannot_be_stopped_and_is_late_is_looked_for(void)
     armed(DR_TRIO, 0);
     host_axis('x', 40800); /* 100 um: 30 ms and 2 s */
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(2050000);
     expect_state(DR_GUARD_STOPPING);
     TEST_ASSERT_FALSE(status().buzzer); /* nobody has asked for a stop */
@@ -109,7 +85,7 @@ static void a_cable_pulled_in_a_stop_ends_it(void)
     armed(DR_TRIO, 0);
     host_line(15, 48000, 40000, 40000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(150000);
     host_code(3);
     run_us(1000);
@@ -128,7 +104,7 @@ static void the_end_of_another_drives_way_is_no_end(void)
     armed(DR_MPC, 0);
     host_point('M', 84000, 80000, 80000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(100000);
     device_says("\r", 1);
     run_us(2000);
@@ -145,7 +121,7 @@ static void a_streamed_position_that_is_cut_off_swallows_no_cr(void)
     armed(DR_MPC, DR_RIG_MAY_STREAM);
     host_line(15, 84000, 80000, 80000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(100000);
     expect_state(DR_GUARD_MOVING_S);
     device_says("\xFF\xFF\xFF\x40", 4);
@@ -184,7 +160,7 @@ static void an_old_reply_that_never_came_hides_no_cr(void)
     run_us(2000000);
     host_line(15, 48000, 40000, 40000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(10000);
     host_code(3);
     run_us(1000);
@@ -202,7 +178,7 @@ static void a_stop_refuses_only_what_was_waiting(void)
     armed(DR_MPC, 0);
     host_line(15, 84000, 80000, 80000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(12000);
     stop_input(true); /* within the frame: it has begun */
     TEST_ASSERT_EQUAL(0, status().refused);
@@ -218,7 +194,7 @@ static void a_stop_of_what_cannot_be_stopped_waits_for_its_own_end(void)
     armed(DR_TRIO, 0);
     host_axis('x', 40800);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(5000);
     const dr_us ends = rig.guard.at[DR_TIMER_TASK];
     stop_input(true);
@@ -235,7 +211,7 @@ static void each_stop_counts_its_own_crs(void)
     for (unsigned round = 0; round < 2; round++) {
         host_line(15, 48000, 40000, 40000);
         run_us(2000);
-        says_home();
+        device_at_home();
         run_us(10000);
         host_code(3);
         run_us(1000);
@@ -243,7 +219,7 @@ static void each_stop_counts_its_own_crs(void)
             device_says("\r\r", 2);
         else
             run_us(300000); /* this time the controller says nothing */
-        rest_at(says_home);
+        rest_at(device_at_home);
         expect_state(DR_GUARD_IDLE);
     }
     expect_cr();
@@ -255,7 +231,7 @@ static void ctrl_c_is_sent_three_times_whatever_it_is_that_asks_for_it(void)
     armed(DR_TRIO, 0);
     host_line(15, 48000, 40000, 40000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(10000);
     host_code(3);
     run_us(151000);
@@ -273,14 +249,14 @@ static void a_fault_says_why_it_stops(void)
     armed(DR_TRIO, 0);
     host_line(15, 48000, 40000, 40000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(10000);
     device_says("0123456789abcdefg", 17);
     TEST_ASSERT_EQUAL(DR_STOP_NOISE, last_record(DR_EVENT_STOP)->code);
     armed(DR_TRIO, 0);
     host_line(15, 48000, 40000, 40000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(10000);
     device_says("\r", 1);
     run_us(2002000); /* and no position */
@@ -292,7 +268,7 @@ static void a_fault_at_rest_breaks_nothing_off(void)
     armed(DR_TRIO, 0);
     host_line(15, 41000, 40000, 40000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(10000);
     host_code(3); /* too late: it is there already */
     run_us(1000);
@@ -327,7 +303,7 @@ static void limits_that_are_damaged_stop_what_is_under_way_and_nothing_else(void
     armed(DR_MPC, 0);
     host_line(15, 84000, 80000, 80000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(12000); /* within the frame: it has to be whole before ^C is heard */
     rig.limits.margin_q ^= 1;
     TEST_ASSERT_FALSE(dr_guard_self_check(&rig.guard, (dr_us)(rig.clock_at_start + rig.now)));

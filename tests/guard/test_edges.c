@@ -1,8 +1,6 @@
 /* What the rows of the fault matrix leave out: rare orders of events, each as a scenario of its own. */
 #include "bench.h"
 
-#include <string.h>
-
 void setUp(void) {}
 void tearDown(void) {}
 
@@ -20,17 +18,8 @@ static void says_at(uint32_t x, uint32_t y, uint32_t z) { device_at(x, y, z, 30)
 static void by_hand_idle(void)
 {
     bench_trio();
-    rig.by_hand = true;
-    bench_start();
-    run_ms(1001);
-    says_at(40000, 40000, 40000);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_ms(3);
-    says_at(40000, 40000, 40000);
-    run_ms(101);
-    says_at(40000, 40000, 40000);
-    expect_state(DR_GUARD_IDLE);
+    bench_start_by_hand(device_at_home);
+    bench_arm_by_hand(device_at_home);
 }
 
 /* On with a line to 44000: its CR is awaited. */

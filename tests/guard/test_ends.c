@@ -1,8 +1,6 @@
 /* Where motions end, and what follows from it. The test is the controller. */
 #include "bench.h"
 
-#include <string.h>
-
 void setUp(void) {}
 void tearDown(void) {}
 
@@ -10,12 +8,7 @@ static dr_us guard_clock(void) { return (dr_us)(rig.clock_at_start + rig.now); }
 
 static void trio_says(uint32_t x) { device_at(x, 40000, 40000, 30); }
 
-static void mpc_says(uint32_t x)
-{
-    const uint8_t reply[] = {1, (uint8_t)x, (uint8_t)(x >> 8), (uint8_t)(x >> 16), 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1,
-                             0, DR_CR};
-    device_says(reply, sizeof reply);
-}
+static void mpc_says(uint32_t x) { device_at_drive(1, x, 80000, 80000); }
 
 static void says(uint32_t x)
 {
@@ -25,33 +18,19 @@ static void says(uint32_t x)
         mpc_says(x);
 }
 
-static void arm_at(uint32_t x)
-{
-    bench_start();
-    run_us(1000000);
-    says(x);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_us(2000);
-    says(x);
-    run_us(100000);
-    says(x);
-    expect_state(DR_GUARD_IDLE);
-}
-
 static void trio(uint16_t facts)
 {
     bench_trio();
-    rig.by_hand = true;
     rig.limits.rig = (uint16_t)(DR_RIG_KNOBS_LOCKED | facts);
-    arm_at(40000);
+    bench_start_by_hand(device_at_home);
+    bench_arm_by_hand(device_at_home);
 }
 
 static void mpc(void)
 {
     bench_mpc();
-    rig.by_hand = true;
-    arm_at(80000);
+    bench_start_by_hand(device_at_home);
+    bench_arm_by_hand(device_at_home);
 }
 
 /* The motion that was asked for is read for, and leaves. */
@@ -192,26 +171,19 @@ static void a_short_way_of_a_trio_is_no_small_move(void)
     TEST_ASSERT_EQUAL_UINT32(2000187, rig.guard.at[DR_TIMER_TASK] - guard_clock()); /* 0.625 um at 5 mm/s */
 }
 
-/* From beside 0,0,0: the frame names no target, so nobody can say that the way is short. */
+static void beside_0(void) { device_at_drive(1, 10, 10, 10); }
+
+/* The frame names no target, so nobody can say that the way is short. */
 static void homing_is_never_a_small_move(void)
 {
-    static const uint8_t near_0[] = {1, 10, 0, 0, 0, 10, 0, 0, 0, 10, 0, 0, 0, 0x0D};
     bench_mpc();
-    rig.by_hand = true;
     rig.limits.drives[0].box_q = (dr_box){{0, 0, 0}, {UM(25000), UM(25000), UM(25000)}};
     rig.limits.drives[0].max_move_q = (uint32_t)DR_FAR_Q;
-    bench_start();
-    run_us(1000000);
-    device_says(near_0, 14);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_us(2000);
-    device_says(near_0, 14);
-    run_us(100000);
-    device_says(near_0, 14);
+    bench_start_by_hand(beside_0);
+    bench_arm_by_hand(beside_0);
     host_code('H');
     run_us(2000);
-    device_says(near_0, 14);
+    beside_0();
     run_us(2500);
     expect_state(DR_GUARD_MOVING_S);
     TEST_ASSERT_FALSE(rig.guard.small);

@@ -1,8 +1,6 @@
 /* When exactly: every span that the guard keeps, to the microsecond, told by when it is due. The test is the controller. */
 #include "bench.h"
 
-#include <string.h>
-
 void setUp(void) {}
 void tearDown(void) {}
 
@@ -219,22 +217,12 @@ static void a_cable_may_tear_a_frame_until_100_ms_behind_it(void)
 /* An MPC-200's line pauses behind its second byte; a stop that comes then has to wait, and what it waits for begins then. */
 static void a_stop_within_a_line_begins_when_the_line_has_left(void)
 {
-    static const uint8_t at_home[] = {1, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x0D};
     bench_mpc();
-    rig.by_hand = true;
-    bench_start();
-    run_us(1000000);
-    device_says(at_home, 14);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_us(2000);
-    device_says(at_home, 14);
-    run_us(100000);
-    device_says(at_home, 14);
-    expect_state(DR_GUARD_IDLE);
+    bench_start_by_hand(device_at_home);
+    bench_arm_by_hand(device_at_home);
     host_line(15, 84000, 80000, 80000);
     run_us(2000);
-    device_says(at_home, 14);
+    device_at_home();
     run_us(2000);
     const uint32_t before = rig.wire_count;
     run_us(10000);

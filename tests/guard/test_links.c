@@ -1,8 +1,6 @@
 /* Cables, the host's port and the key: what each change ends, and what it leaves alone. The test is the controller. */
 #include "bench.h"
 
-#include <string.h>
-
 void setUp(void) {}
 void tearDown(void) {}
 
@@ -31,13 +29,7 @@ static void armed(uint16_t facts, dr_host_loss loss)
     begun(facts, loss);
     run_us(1000000);
     says(40000);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_us(2000);
-    says(40000);
-    run_us(100000);
-    says(40000);
-    expect_state(DR_GUARD_IDLE);
+    bench_arm_by_hand(device_at_home);
 }
 
 static void line_is_read_for(void)

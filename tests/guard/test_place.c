@@ -2,8 +2,6 @@
  * MP-285 (8 steps/um, 8 quanta/step), an MPC-200 with an MP-225 (16 steps/um) and an MP-845 (3 quanta/step). */
 #include "bench.h"
 
-#include <string.h>
-
 void setUp(void) {}
 void tearDown(void) {}
 
@@ -29,18 +27,9 @@ static void begun(void)
 static void armed_with(uint16_t facts)
 {
     bench_trio();
-    rig.by_hand = true;
     rig.limits.rig = facts;
-    bench_start();
-    run_us(1000000);
-    says(home);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_us(2000);
-    says(home);
-    run_us(100000);
-    says(home);
-    expect_state(DR_GUARD_IDLE);
+    bench_start_by_hand(device_at_home);
+    bench_arm_by_hand(device_at_home);
 }
 
 static void a_reading_may_be_500_um_beyond_the_travel(void)
@@ -61,13 +50,11 @@ static void a_reading_may_be_500_um_beyond_the_travel(void)
 static void mpc_says(uint8_t drive, uint8_t axis, uint32_t steps)
 {
     uint32_t at[DR_AXES] = {80000, 80000, 80000};
-    uint8_t reply[14] = {drive};
     at[axis] = steps;
-    for (uint8_t i = 0; i < 12; i++)
-        reply[1 + i] = (uint8_t)(at[i / 4] >> (8 * (i % 4)));
-    reply[13] = DR_CR;
-    device_says(reply, sizeof reply);
+    device_at_drive(drive, at[0], at[1], at[2]);
 }
+
+static void second_drive_at_home(void) { device_at_drive(2, 80000, 80000, 80000); }
 
 static void beyond_the_travel_of_the_drive_that_speaks(void)
 {
@@ -195,18 +182,9 @@ static void each_drive_is_held_against_its_own_place(void)
 {
     for (uint32_t jump = 426; jump <= 427; jump++) {
         bench_mpc();
-        rig.by_hand = true;
         TEST_ASSERT_TRUE(dr_limits_init_drive(&rig.limits, 1, DR_STAGE_MPC_MP845));
-        bench_start();
-        run_us(1000000);
-        mpc_says(2, DR_X, 80000);
-        input(DR_INPUT_KEY, true);
-        press(DR_INPUT_ARM);
-        run_us(2000);
-        mpc_says(2, DR_X, 80000);
-        run_us(100000);
-        mpc_says(2, DR_X, 80000);
-        expect_state(DR_GUARD_IDLE);
+        bench_start_by_hand(second_drive_at_home);
+        bench_arm_by_hand(second_drive_at_home);
         host_point('M', 80000, 80100, 80000);
         run_us(2000);
         mpc_says(2, DR_Z, 80000 + jump);
@@ -214,16 +192,8 @@ static void each_drive_is_held_against_its_own_place(void)
         expect_state(jump == 426 ? DR_GUARD_CHECKING : DR_GUARD_FAULT);
     }
     bench_mpc(); /* another drive, chosen by hand, is anywhere: no jump, but not the one that the host meant */
-    rig.by_hand = true;
-    bench_start();
-    run_us(1000000);
-    mpc_says(1, DR_X, 80000);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_us(2000);
-    mpc_says(1, DR_X, 80000);
-    run_us(100000);
-    mpc_says(1, DR_X, 80000);
+    bench_start_by_hand(device_at_home);
+    bench_arm_by_hand(device_at_home);
     host_point('M', 80000, 80100, 80000);
     run_us(2000);
     mpc_says(2, DR_X, 90000); /* which is news: read twice */

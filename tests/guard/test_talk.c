@@ -2,8 +2,6 @@
  * The test is the controller. */
 #include "bench.h"
 
-#include <string.h>
-
 void setUp(void) {}
 void tearDown(void) {}
 
@@ -11,41 +9,20 @@ static dr_us guard_clock(void) { return (dr_us)(rig.clock_at_start + rig.now); }
 
 static void trio_says(uint32_t x) { device_at(x, 40000, 40000, 30); }
 
-static void says_home(void)
-{
-    static const uint8_t mpc[] = {1, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x80, 0x38, 1, 0, 0x0D};
-    if (rig.limits.kind == DR_TRIO)
-        trio_says(40000);
-    else
-        device_says(mpc, 14);
-}
-
 static void proved(dr_kind kind, uint16_t facts)
 {
     if (kind == DR_TRIO)
         bench_trio();
     else
         bench_mpc();
-    rig.by_hand = true;
     rig.limits.rig = (uint16_t)(DR_RIG_KNOBS_LOCKED | facts);
-    bench_start();
-    run_us(1000000);
-    says_home();
-    run_us(1000);
-    expect_state(DR_GUARD_DISARMED);
+    bench_start_by_hand(device_at_home);
 }
 
 static void armed(dr_kind kind, uint16_t facts)
 {
     proved(kind, facts);
-    input(DR_INPUT_KEY, true);
-    press(DR_INPUT_ARM);
-    run_us(2000);
-    says_home();
-    run_us(100000);
-    says_home();
-    run_us(1000);
-    expect_state(DR_GUARD_IDLE);
+    bench_arm_by_hand(device_at_home);
 }
 
 static void x_moves(void)
@@ -53,7 +30,7 @@ static void x_moves(void)
     armed(DR_TRIO, 0);
     host_axis('x', 40800);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(6000);
     expect_state(DR_GUARD_MOVING_U);
 }
@@ -63,7 +40,7 @@ static void line_moves(void)
     armed(DR_TRIO, 0);
     host_line(15, 48000, 40000, 40000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(10000);
     expect_state(DR_GUARD_MOVING_S);
 }
@@ -188,7 +165,7 @@ static void streamed_bytes_are_no_cr_and_noise_is_no_stream(void)
     expect_silence();
     host_line(15, 84000, 80000, 80000);
     run_us(2000);
-    says_home();
+    device_at_home();
     run_us(60000);
     host_code(3);
     run_us(500);
