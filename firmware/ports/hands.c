@@ -4,8 +4,8 @@
 #include "emulator.h"
 #include "port.h"
 
-#define KNOB_COUNT ((DR_PORT_INPUTS - DR_INPUT_KNOB_X) / 2u)
-#define BUTTONS ((1u << DR_INPUT_KNOB_X) - 1u)
+#define KNOB_COUNT ((DR_PORT_INPUTS - DR_HANDS_KNOB_X) / 2u)
+#define BUTTONS ((1u << DR_HANDS_KNOB_X) - 1u)
 #define KNOBS (0xFFFFu - BUTTONS)
 enum { OUTPUT_BUZZER = 1u << 0, OUTPUT_LED = 1u << 1 };
 
@@ -26,9 +26,9 @@ static bool is_trio(void) { return panel.controller->kind == DR_TRIO; }
 
 static void press(dr_us now, uint8_t input, bool down)
 {
-    if (input < DR_INPUT_MAINS) {
-        const bool is_same = is_trio() || input < DR_INPUT_STOP;
-        const dr_button button = (dr_button)(is_same ? input : input - DR_INPUT_STOP + DR_BUTTON_STOP);
+    if (input < DR_HANDS_MAINS) {
+        const bool is_same = is_trio() || input < DR_HANDS_STOP;
+        const dr_button button = (dr_button)(is_same ? input : input - DR_HANDS_STOP + DR_BUTTON_STOP);
         (void)(down ? dr_panel_press : dr_panel_release)(&panel, now, button);
     } else if (down && is_trio()) {
         dr_panel_power(&panel, now, panel.controller->state == DR_STATE_OFF);
@@ -45,11 +45,11 @@ static bool look(dr_us now)
     const unsigned turned = (unsigned)(inputs ^ seen) & KNOBS;
     bool is_used = changed != 0;
     seen = inputs;
-    for (uint8_t input = 0; changed != 0 && input < DR_INPUT_KNOB_X; input++)
+    for (uint8_t input = 0; changed != 0 && input < DR_HANDS_KNOB_X; input++)
         if ((changed >> input & 1u) != 0)
             press(now, input, ((unsigned)buttons.closed >> input & 1u) != 0);
     for (uint8_t i = 0; turned != 0 && i < KNOB_COUNT; i++) {
-        const unsigned pair = (unsigned)inputs >> ((unsigned)DR_INPUT_KNOB_X + 2u * i);
+        const unsigned pair = (unsigned)inputs >> ((unsigned)DR_HANDS_KNOB_X + 2u * i);
         const int8_t detents = dr_encoder_look(&knobs[i], (pair & 1u) != 0, (pair & 2u) != 0);
         if (detents == 0)
             continue;

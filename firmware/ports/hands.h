@@ -29,22 +29,22 @@ extern "C" {
 
 /* Inputs by number, for boards whose pins are chosen elsewhere (arduino/). A knob has this one and the next. */
 enum {
-    DR_INPUT_HOME = 0,
-    DR_INPUT_WORK = 1,
-    DR_INPUT_PULSE = 2,
-    DR_INPUT_STOP = 2,
-    DR_INPUT_RELATIVE = 3,
-    DR_INPUT_DIAGONAL = 3,
-    DR_INPUT_SPEED = 4,
-    DR_INPUT_CALIBRATE = 4,
-    DR_INPUT_MAINS = 5,
-    DR_INPUT_MANIPULATOR = 5,
-    DR_INPUT_KNOB_X = 6,
-    DR_INPUT_KNOB_Y = 8,
-    DR_INPUT_KNOB_Z = 10,
-    DR_INPUT_KNOB_D = 12,
-    DR_INPUT_KNOB_MANIPULATOR = 12,
-    DR_INPUT_KNOB_MODE = 14
+    DR_HANDS_HOME = 0,
+    DR_HANDS_WORK = 1,
+    DR_HANDS_PULSE = 2,
+    DR_HANDS_STOP = 2,
+    DR_HANDS_RELATIVE = 3,
+    DR_HANDS_DIAGONAL = 3,
+    DR_HANDS_SPEED = 4,
+    DR_HANDS_CALIBRATE = 4,
+    DR_HANDS_MAINS = 5,
+    DR_HANDS_MANIPULATOR = 5,
+    DR_HANDS_KNOB_X = 6,
+    DR_HANDS_KNOB_Y = 8,
+    DR_HANDS_KNOB_Z = 10,
+    DR_HANDS_KNOB_D = 12,
+    DR_HANDS_KNOB_MANIPULATOR = 12,
+    DR_HANDS_KNOB_MODE = 14
 };
 
 #define DR_BEEP_US UINT32_C(100000)

@@ -5,6 +5,8 @@
 #include "hands.h"
 #include "port.h"
 
+#include "dr_guard.h" /* no name is in it and in hands.h */
+
 #include "unity.h"
 
 #include <string.h>
@@ -118,10 +120,10 @@ void tearDown(void) {}
 static void test_a_hold_of_3_s_is_a_press_before_and_stores_after(void)
 {
     switch_on(0);
-    hold_ms(DR_INPUT_WORK, 2998);
+    hold_ms(DR_HANDS_WORK, 2998);
     TEST_ASSERT_FALSE(controller()->drives[0].work_is_set);
     TEST_ASSERT_EQUAL(0, dr_hands_panel()->beeps);
-    hold_ms(DR_INPUT_WORK, 3003 + BOUNCE_MS);
+    hold_ms(DR_HANDS_WORK, 3003 + BOUNCE_MS);
     TEST_ASSERT_TRUE(controller()->drives[0].work_is_set);
     TEST_ASSERT_EQUAL(1, dr_hands_panel()->beeps);
 }
@@ -130,7 +132,7 @@ static void test_a_hold_of_3_s_is_a_press_before_and_stores_after(void)
 static void test_who_sleeps_too_long_still_does_things_in_order(void)
 {
     switch_on(0);
-    closed = 1u << DR_INPUT_WORK;
+    closed = 1u << DR_HANDS_WORK;
     run_ms(3000);
     TEST_ASSERT_FALSE(controller()->drives[0].work_is_set);
     oversleep_us = 50u * MS;
@@ -149,43 +151,43 @@ static void test_who_sleeps_too_long_still_does_things_in_order(void)
 static void test_each_button_is_the_panels(void)
 {
     switch_on(0);
-    hold_ms(DR_INPUT_SPEED, 50);
+    hold_ms(DR_HANDS_SPEED, 50);
     TEST_ASSERT_EQUAL(1, dr_hands_panel()->speed);
-    hold_ms(DR_INPUT_RELATIVE, 50);
+    hold_ms(DR_HANDS_RELATIVE, 50);
     TEST_ASSERT_TRUE(dr_hands_panel()->is_relative);
-    hold_ms(DR_INPUT_PULSE, 50);
+    hold_ms(DR_HANDS_PULSE, 50);
     TEST_ASSERT_EQUAL(10667 + 26, at()[DR_X]);
-    hold_ms(DR_INPUT_PULSE, 3020);
+    hold_ms(DR_HANDS_PULSE, 3020);
     TEST_ASSERT_TRUE(dr_hands_panel()->is_setting_angle);
-    turn(DR_INPUT_KNOB_D, 7);
+    turn(DR_HANDS_KNOB_D, 7);
     TEST_ASSERT_EQUAL(37, controller()->angle_deg);
-    hold_ms(DR_INPUT_HOME, 50);
+    hold_ms(DR_HANDS_HOME, 50);
     TEST_ASSERT_EQUAL(DR_STATE_MOVING, controller()->state);
-    hold_ms(DR_INPUT_HOME, 50);
+    hold_ms(DR_HANDS_HOME, 50);
     TEST_ASSERT_EQUAL(DR_STATE_PAUSED, controller()->state);
-    hold_ms(DR_INPUT_MAINS, 50);
+    hold_ms(DR_HANDS_MAINS, 50);
     TEST_ASSERT_EQUAL(DR_STATE_OFF, controller()->state);
-    hold_ms(DR_INPUT_MAINS, 50);
+    hold_ms(DR_HANDS_MAINS, 50);
     TEST_ASSERT_EQUAL(DR_STATE_MOVING, controller()->state); /* it calibrates */
 }
 
 static void test_each_button_of_an_mpc_is_the_panels(void)
 {
     switch_on(DR_STRAP_OTHER);
-    hold_ms(DR_INPUT_DIAGONAL, 50);
+    hold_ms(DR_HANDS_DIAGONAL, 50);
     TEST_ASSERT_TRUE(dr_hands_panel()->drives[0].is_diagonal);
     TEST_ASSERT_EQUAL(2, outputs); /* its LED */
-    hold_ms(DR_INPUT_CALIBRATE, 10);
+    hold_ms(DR_HANDS_CALIBRATE, 10);
     TEST_ASSERT_EQUAL(DR_OP_MPC_CALIBRATE, controller()->move_op);
-    hold_ms(DR_INPUT_STOP, 50);
+    hold_ms(DR_HANDS_STOP, 50);
     TEST_ASSERT_EQUAL(DR_STATE_REST, controller()->state);
-    hold_ms(DR_INPUT_MANIPULATOR, 50);
+    hold_ms(DR_HANDS_MANIPULATOR, 50);
     TEST_ASSERT_EQUAL(1, controller()->active);
-    turn(DR_INPUT_KNOB_MANIPULATOR, -1);
+    turn(DR_HANDS_KNOB_MANIPULATOR, -1);
     TEST_ASSERT_EQUAL(0, controller()->active);
-    turn(DR_INPUT_KNOB_MODE, 9);
+    turn(DR_HANDS_KNOB_MODE, 9);
     TEST_ASSERT_EQUAL(9, controller()->drives[0].mode);
-    hold_ms(DR_INPUT_WORK, 2020);
+    hold_ms(DR_HANDS_WORK, 2020);
     TEST_ASSERT_TRUE(dr_hands_panel()->drives[0].is_locked);
 }
 
@@ -193,7 +195,7 @@ static void test_manipulator_as_a_button_goes_up(void)
 {
     switch_on(DR_STRAP_OTHER | DR_STRAP_STAGES); /* four devices */
     for (unsigned i = 1; i <= 4; i++) {
-        hold_ms(DR_INPUT_MANIPULATOR, 50);
+        hold_ms(DR_HANDS_MANIPULATOR, 50);
         TEST_ASSERT_EQUAL(i % 4u, controller()->active);
     }
 }
@@ -201,18 +203,18 @@ static void test_manipulator_as_a_button_goes_up(void)
 static void test_knobs_move_their_axes(void)
 {
     switch_on(DR_STRAP_OTHER);
-    turn(DR_INPUT_KNOB_MODE, 9);
-    turn(DR_INPUT_KNOB_X, 5);
-    turn(DR_INPUT_KNOB_Y, 4);
-    turn(DR_INPUT_KNOB_Z, 3);
-    turn(DR_INPUT_KNOB_X, -2);
+    turn(DR_HANDS_KNOB_MODE, 9);
+    turn(DR_HANDS_KNOB_X, 5);
+    turn(DR_HANDS_KNOB_Y, 4);
+    turn(DR_HANDS_KNOB_Z, 3);
+    turn(DR_HANDS_KNOB_X, -2);
     static const uint32_t there[DR_AXES] = {3, 4, 3};
     TEST_ASSERT_EQUAL_UINT32_ARRAY(there, at(), DR_AXES);
 }
 
 static void test_what_is_pressed_when_the_power_comes_is_not_pressed(void)
 {
-    closed = 1u << DR_INPUT_CALIBRATE | 1u << DR_INPUT_KNOB_X;
+    closed = 1u << DR_HANDS_CALIBRATE | 1u << DR_HANDS_KNOB_X;
     straps = DR_STRAP_OTHER;
     dr_hands_begin();
     run_ms(3 * BOUNCE_MS);
@@ -220,14 +222,14 @@ static void test_what_is_pressed_when_the_power_comes_is_not_pressed(void)
     TEST_ASSERT_EQUAL(0, at()[DR_X]);
     closed = 0;
     run_ms(20);
-    hold_ms(DR_INPUT_CALIBRATE, 10);
+    hold_ms(DR_HANDS_CALIBRATE, 10);
     TEST_ASSERT_EQUAL(DR_OP_MPC_CALIBRATE, controller()->move_op);
 }
 
 static void test_the_buzzer_sounds_for_a_tenth_of_a_second(void)
 {
     switch_on(0);
-    closed = 1u << DR_INPUT_HOME;
+    closed = 1u << DR_HANDS_HOME;
     run_ms(BOUNCE_MS + 2990);
     TEST_ASSERT_EQUAL(0, outputs & 1);
     run_ms(15);
@@ -242,25 +244,25 @@ static void test_the_lamp_is_the_screens_red(void)
 {
     switch_on(0);
     TEST_ASSERT_EQUAL(0, outputs);
-    hold_ms(DR_INPUT_HOME, 20);
+    hold_ms(DR_HANDS_HOME, 20);
     TEST_ASSERT_EQUAL(2, outputs);
     run_ms(700);
     TEST_ASSERT_EQUAL(0, outputs);
-    hold_ms(DR_INPUT_SPEED, 3020); /* LOCK */
+    hold_ms(DR_HANDS_SPEED, 3020); /* LOCK */
     run_ms(200);
     TEST_ASSERT_EQUAL(2, outputs);
-    hold_ms(DR_INPUT_MAINS, 20);
+    hold_ms(DR_HANDS_MAINS, 20);
     TEST_ASSERT_EQUAL(0, outputs);
 }
 
 static void test_what_hands_did_is_kept_without_power(void)
 {
     switch_on(DR_STRAP_OTHER);
-    turn(DR_INPUT_KNOB_X, 3);
-    hold_ms(DR_INPUT_STOP, 0);
-    closed = 1u << DR_INPUT_STOP;
+    turn(DR_HANDS_KNOB_X, 3);
+    hold_ms(DR_HANDS_STOP, 0);
+    closed = 1u << DR_HANDS_STOP;
     run_ms(20);
-    hold_ms(DR_INPUT_WORK, 20);
+    hold_ms(DR_HANDS_WORK, 20);
     closed = 0;
     run_ms(1100);
     const uint32_t was = at()[DR_X];

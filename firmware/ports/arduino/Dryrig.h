@@ -29,8 +29,8 @@ class DryrigEmulator
 class DryrigEmulatorWithHands
 {
   public:
-    void button(uint8_t input, uint8_t pin);                /* DR_INPUT_HOME and so on, of hands.h */
-    void knob(uint8_t input, uint8_t pin_a, uint8_t pin_b); /* DR_INPUT_KNOB_X and so on */
+    void button(uint8_t input, uint8_t pin);                /* DR_HANDS_HOME and so on, of hands.h */
+    void knob(uint8_t input, uint8_t pin_a, uint8_t pin_b); /* DR_HANDS_KNOB_X and so on */
     void buzzer(uint8_t pin);                               /* high for 0.1 s where the controller beeps */
     void led(uint8_t pin);                                  /* high while a TRIO's screen is red; NORM/DIAG */
     void begin(Stream &line, dr_kind kind, uint8_t straps = 0);
