@@ -199,28 +199,31 @@ bool kept_begin(kept_file *f, const instrument *ins, char why[WHY_ROOM])
     return f->path == NULL || f->has_begun;
 }
 
-static void write_changes(kept_file *f, const instrument *ins)
+static bool write_changes(kept_file *f, const instrument *ins)
 {
     const kept_state present = kept_of(ins);
-    if (is_same(&present, &f->last) || replace(f, &present) || f->told)
-        return;
+    if (is_same(&present, &f->last) || replace(f, &present))
+        return true;
+    if (!f->told)
+        (void)fprintf(stderr, "dryrig-emu: the state cannot be kept, %s stays as it was: %s\n", f->path,
+                      strerror(errno));
     f->told = true;
-    (void)fprintf(stderr, "dryrig-emu: the state cannot be kept, %s stays as it was: %s\n", f->path, strerror(errno));
+    return false;
 }
 
 void kept_update(kept_file *f, const instrument *ins)
 {
     const uint8_t state = ins->controller.state;
     if (f->has_begun && state != DR_STATE_MOVING && state != DR_STATE_PAUSED)
-        write_changes(f, ins);
+        (void)write_changes(f, ins);
 }
 
-void kept_close(kept_file *f, const instrument *ins)
+bool kept_close(kept_file *f, const instrument *ins)
 {
-    if (f->has_begun)
-        write_changes(f, ins);
+    const bool done = !f->has_begun || write_changes(f, ins);
     if (f->path != NULL)
         (void)close(f->lock);
     free(f->path);
     memset(f, 0, sizeof *f);
+    return done;
 }

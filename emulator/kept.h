@@ -52,7 +52,7 @@ bool kept_open(kept_file *f, const char *path, const kept_state *expected, char 
 bool kept_begin(kept_file *f, const instrument *ins, char why[WHY_ROOM]);
 /* Writes what has changed, once nothing moves. What cannot be written is said on stderr, once; the file stays as it was. */
 void kept_update(kept_file *f, const instrument *ins);
-/* Writes what has changed, also in the middle of a move: it ends where it is. */
-void kept_close(kept_file *f, const instrument *ins);
+/* Writes what has changed, also in the middle of a move: it ends where it is. False: that could not be written. */
+bool kept_close(kept_file *f, const instrument *ins);
 
 #endif

@@ -2,23 +2,20 @@
  *
  *     options -> rig: setups of controllers -> stations: instrument (controller, quirks of bytes, paced line) <-> pty
  *                                                 |                                    link: its stable name
- *                                             observers: trace, ...
+ *                                             observers: reports (trace, lint, recording), ...
  *     engine: the loop and the clock            control: commands while it runs      child: the command of `run`
  */
-#define _GNU_SOURCE /* signalfd, mkdtemp */
-#include "child.h"  /* the command of `run` */
-#include "desk.h"   /* what it is told while it runs */
-#include "engine.h" /* the loop */
-#include "first.h"  /* what is done at the start */
-#include "lint.h"   /* which rules the host breaks */
-#include "lint_report.h"
+#define _GNU_SOURCE   /* signalfd, mkdtemp */
+#include "child.h"    /* the command of `run` */
+#include "desk.h"     /* what it is told while it runs */
+#include "engine.h"   /* the loop */
+#include "first.h"    /* what is done at the start */
 #include "options.h"  /* what was asked for */
 #include "playback.h" /* the controller's side of a recording, for a host */
-#include "record.h"   /* the bytes of the line, kept */
-#include "replay.h"   /* and played again */
+#include "replay.h"   /* the host's side, for a controller */
 #include "replay_port.h"
+#include "reports.h"  /* what is written about it */
 #include "terminal.h" /* leaving it as it was */
-#include "trace.h"    /* what happens, in words */
 
 #include "dr_words.h" /* names for people */
 
@@ -42,16 +39,11 @@ typedef struct {
     source signals; /* the first, see on_signal() */
     options *o;
     engine e;
-    trace trace;
-    observer_link *trace_links;
+    reports reports;
     desk desk;
     kept_file *kept; /* one for each station */
+    bool is_kept;    /* all that was to be kept */
     first first;     /* what is done at the start */
-    lint lint;
-    observer_link *lint_links;
-    FILE *lint_json, *lint_junit;
-    recorder recorder;
-    observer_link *record_links;
     int signal_fd;
     sigset_t mask_before;
     pid_t child;       /* 0: none */
@@ -262,12 +254,8 @@ static bool set_up(program *p)
     e->waits_for_client = o->waits_for_client;
     e->station_count = o->rig.count;
     e->stations = calloc(o->rig.count, sizeof *e->stations);
-    p->trace_links = calloc(o->rig.count, sizeof *p->trace_links);
-    p->lint_links = calloc(o->rig.count, sizeof *p->lint_links);
-    p->record_links = calloc(o->rig.count, sizeof *p->record_links);
     p->kept = calloc(o->rig.count, sizeof *p->kept);
-    if (e->stations == NULL || p->trace_links == NULL || p->lint_links == NULL || p->record_links == NULL ||
-        p->kept == NULL)
+    if (e->stations == NULL || p->kept == NULL)
         return false;
     for (unsigned i = 0; i < e->station_count; i++) {
         station *const s = &e->stations[i];
@@ -278,81 +266,6 @@ static bool set_up(program *p)
         faults_init(&s->ins.faults, o->seed + i);
     }
     return true;
-}
-
-static bool open_trace(program *p)
-{
-    if (p->o->trace == NULL)
-        return true;
-    if (!trace_open(&p->trace, p->o->trace, p->e.station_count > 1)) {
-        (void)fprintf(stderr, "dryrig-emu: --trace %s: %s\n", p->o->trace, strerror(errno));
-        return false;
-    }
-    for (unsigned i = 0; i < p->e.station_count; i++) {
-        p->trace_links[i].who = &p->trace.base;
-        station_observe(&p->e.stations[i], &p->trace_links[i]);
-    }
-    return true;
-}
-
-static bool open_record(program *p)
-{
-    if (p->o->record == NULL)
-        return true;
-    if (!recorder_open(&p->recorder, p->o->record)) {
-        (void)fprintf(stderr, "dryrig-emu: --record %s: %s\n", p->o->record, strerror(errno));
-        return false;
-    }
-    for (unsigned i = 0; i < p->e.station_count; i++) {
-        station *const s = &p->e.stations[i];
-        recorder_introduce(&p->recorder, s->name, &s->ins);
-        p->record_links[i].who = &p->recorder.base;
-        station_observe(s, &p->record_links[i]);
-    }
-    return true;
-}
-
-static bool open_report(const char *option, const char *path, FILE **file)
-{
-    if (path == NULL || (*file = recording_file(path)) != NULL)
-        return true;
-    (void)fprintf(stderr, "dryrig-emu: --%s %s: %s\n", option, path, strerror(errno));
-    return false;
-}
-
-static bool open_lint(program *p)
-{
-    if (!p->o->lints)
-        return true;
-    lint_open(&p->lint);
-    p->lint.clock_jumps = p->o->clock == CLOCK_JUMP;
-    for (unsigned i = 0; i < p->e.station_count; i++) {
-        p->lint_links[i].who = &p->lint.base;
-        station_observe(&p->e.stations[i], &p->lint_links[i]);
-    }
-    return open_report("lint-json", p->o->lint_json, &p->lint_json) &&
-           open_report("lint-junit", p->o->lint_junit, &p->lint_junit);
-}
-
-static void close_report(const char *path, FILE *file, bool done)
-{
-    if (file != NULL && (fclose(file) != 0 || !done))
-        (void)fprintf(stderr, "dryrig-emu: %s is incomplete: %s\n", path, strerror(errno));
-}
-
-/* All has been observed. */
-static void report_lint(program *p)
-{
-    if (!p->o->lints)
-        return;
-    (void)lint_report_text(&p->lint, stderr); /* who has closed stderr does not want to know */
-    if (p->lint_json != NULL)
-        close_report(p->o->lint_json, p->lint_json, lint_report_json(&p->lint, p->lint_json));
-    if (p->lint_junit != NULL)
-        close_report(p->o->lint_junit, p->lint_junit, lint_report_junit(&p->lint, p->lint_junit));
-    if (p->o->is_strict && p->status == 0 && lint_total(&p->lint) > 0)
-        p->status = EXIT_FINDINGS;
-    lint_close(&p->lint);
 }
 
 /* -- What is kept -------------------------------------------------------------------------------------------------------- */
@@ -394,8 +307,9 @@ static bool begin_kept(program *p)
 
 static void close_kept(program *p)
 {
+    p->is_kept = true;
     for (unsigned i = 0; i < p->e.station_count; i++)
-        kept_close(&p->kept[i], &p->e.stations[i].ins);
+        p->is_kept = kept_close(&p->kept[i], &p->e.stations[i].ins) && p->is_kept;
     free(p->kept);
 }
 
@@ -443,9 +357,10 @@ static void start_and_run(program *p)
 {
     char why[PATH_ROOM + 256];
     p->status = 1;
-    if (!open_trace(p) || !open_lint(p) || !open_record(p))
+    if (!reports_open(&p->reports, p->o, p->e.stations, p->e.station_count))
         return;
-    if (!desk_open(&p->desk, &p->e, p->trace.file == NULL ? NULL : &p->trace, p->o->control, why, sizeof why)) {
+    trace *const t = p->o->trace == NULL ? NULL : &p->reports.trace;
+    if (!desk_open(&p->desk, &p->e, t, p->o->control, why, sizeof why)) {
         (void)fprintf(stderr, "dryrig-emu: --control: %s\n", why);
         return;
     }
@@ -480,12 +395,23 @@ static void tell_seed(const program *p)
         (void)fprintf(stderr, "dryrig-emu: chance began with --seed %llu\n", (unsigned long long)p->o->seed);
 }
 
+/* The last word: the command's, or our own, where that says that all went well. */
+static void finish(program *p)
+{
+    unsigned long findings;
+    const bool is_written = reports_finish(&p->reports, &findings);
+    if (p->status == 0 && p->o->is_strict && findings > 0)
+        p->status = EXIT_FINDINGS;
+    else if (p->status == 0 && (!is_written || !p->is_kept))
+        p->status = 1;
+}
+
 static int run(program *p)
 {
     char why[PATH_ROOM + 256];
     if (!set_up(p))
         return fail("no memory");
-    language reader = {.e = &p->e, .trace = p->o->trace == NULL ? NULL : &p->trace};
+    language reader = {.e = &p->e, .trace = p->o->trace == NULL ? NULL : &p->reports.trace};
     if (!first_check(&p->first, p->o, &reader))
         return 2;
     if (p->o->task == TASK_CHECK) {
@@ -505,10 +431,9 @@ static int run(program *p)
         desk_close(&p->desk);
         close_kept(p);
         engine_close(&p->e);
-        trace_close(&p->trace);
-        recorder_close(&p->recorder);
+        reports_stop(&p->reports);
         await_command(p);
-        report_lint(p);
+        finish(p);
     } else {
         (void)fprintf(stderr, "dryrig-emu: %s\n", why);
         p->status = 1;

@@ -70,41 +70,40 @@ enum {
 static const struct argp_option known[] = {
     {"link", LINK, "PATH", 0, "Make a symbolic link PATH to the port; it is removed at the end", 1},
     {"device", DEVICE, "MODEL", 0,
-     "What is connected: the first --device to port 1, and so on; 'none' leaves a port empty. Once for trio (default "
-     "MP-845), up to "
-     "four times for mpc (default: MP-225 at ports 1 and 2)",
+     "What is connected: the first --device to port 1, and so on; 'none' leaves a port empty. "
+     "Once for trio (default MP-845), up to four times for mpc (default: MP-225 at ports 1 and 2)",
      2},
     {"firmware", FIRMWARE, "X.YY", 0, "Version of the controller's firmware (default: 3.12 for trio, 3.21 for mpc)", 2},
     {"position", POSITION, "X,Y,Z", 0,
-     "Where a device is at the start, in microsteps, or in microns: 100um,200um,300um. The first --position is for the "
-     "first device, "
-     "and so on (default: 1,000 um on each axis for trio, 0,0,0 for mpc)",
+     "Where a device is at the start, in microsteps, or in microns: 100um,200um,300um. "
+     "The first --position is for the first device, and so on "
+     "(default: 1,000 um on each axis for trio, 0,0,0 for mpc)",
      2},
     {"home", HOME, "X,Y,Z", 0, "trio: the stored home position (default 0,0,0)", 2},
     {"work", WORK, "X,Y,Z", 0, "The stored work position of a device, repeated as --position (default: none)", 2},
     {"angle", ANGLE, "DEG", 0,
-     "trio: 0 to 90 (default 30). mpc: how steep the diagonal of all devices is: 7, 11, 14, 21, 27, 29, 35, 39 or 45 "
-     "degrees off the "
-     "horizontal; '29more' for the steep side of 45 (default 29, that is 29less)",
+     "trio: 0 to 90 (default 30). "
+     "mpc: how steep the diagonal of all devices is: "
+     "7, 11, 14, 21, 27, 29, 35, 39 or 45 degrees off the horizontal; "
+     "'29more' for the steep side of 45 (default 29, that is 29less)",
      2},
     {"quirks", QUIRKS, "LIST", 0,
-     "'documented' (default): as the manuals say; 'observed': and what people meet on real controllers; or names with "
-     "commas between, "
-     "see the manual page",
+     "'documented' (default): as the manuals say; "
+     "'observed': and what people meet on real controllers; "
+     "or names with commas between, see the manual page",
      3},
     {"pace", PACE, "on|off", 0,
      "Take and send bytes at the rate of the serial line (default with --clock real), or as fast as they come", 4},
     {"clock", CLOCK, "real|step|jump", 0,
-     "How the controller's time goes: with real time (default); only when told (control channel: advance); or on to "
-     "the "
-     "next event whenever the controller only waits",
+     "How the controller's time goes: with real time (default); "
+     "only when told (control channel: advance); "
+     "or on to the next event whenever the controller only waits",
      4},
     {"speedup", SPEEDUP, "N", 0, "Run the controller's clock and its line N times faster, 1 to 1000", 4},
     {"wait-client", WAIT_CLIENT, NULL, 0, "The controller's clock stands until somebody has opened the port", 4},
     {"state", STATE, "FILE", 0,
-     "Begin where the controller was left, and keep positions, home, work, angle and switches in FILE; what other "
-     "options say "
-     "counts more",
+     "Begin where the controller was left, and keep positions, home, work, angle and switches in FILE; "
+     "what other options say counts more",
      5},
     {"trace", TRACE, "FILE", 0,
      "Write what happens, in words, to FILE; '-' is stderr; FILE.jsonl gets JSON, an object a line", 5},
@@ -114,9 +113,7 @@ static const struct argp_option known[] = {
     {"panel", PANEL, NULL, 0, "Show the controller's panel in this terminal; it ends with it. See dryrig-panel(1)", 5},
     {"do", DO, "COMMAND", 0, "Do this at the start, in the same language; may be repeated", 5},
     {"scenario", SCENARIO, "FILE", 0,
-     "Do the lines of FILE at the start, before --do; they are checked before anything "
-     "starts",
-     5},
+     "Do the lines of FILE at the start, before --do; they are checked before anything starts", 5},
     {"seed", SEED, "N", 0, "Where chance begins (default: another one each time)", 5},
     {"lint", LINT, "on|off", OPTION_ARG_OPTIONAL,
      "At the end, say on stderr which rules of the protocol the host has broken (default with run: on)", 6},
@@ -387,15 +384,21 @@ options options_read(int argc, char **argv)
     static const struct argp argp = {
         known,
         parse,
-        "trio|mpc\nrun trio|mpc -- COMMAND [ARGUMENT...]\nrun --rig FILE -- COMMAND [ARGUMENT...]\nrig [check] FILE\n"
-        "replay FILE\nreplay FILE --port PATH --may-move\nreplay --to-host FILE\n"
+        "trio|mpc\n"
+        "run trio|mpc -- COMMAND [ARGUMENT...]\n"
+        "run --rig FILE -- COMMAND [ARGUMENT...]\n"
+        "rig [check] FILE\n"
+        "replay FILE\n"
+        "replay FILE --port PATH --may-move\n"
+        "replay --to-host FILE\n"
         "ctl PATH COMMAND",
         "Stands in for a Sutter TRIO MP-245A (trio) or MPC-200 (mpc) micromanipulator controller on a pseudo-terminal. "
         "Prints 'ready' and the port's path, and runs until SIGINT, SIGTERM or SIGHUP.\n"
         "With run: prints nothing, and runs as long as COMMAND does, which finds the port's path in DRYRIG_PORT.\v"
-        "Exit status: 0 stopped by a signal, 1 the port, the link or the trace cannot be had, 2 wrong options. With "
-        "run: that of COMMAND; 126 it cannot be executed, 127 it is not there, 128+N signal N ended it; 3 with "
-        "--strict.",
+        "Exit status: 0 stopped by a signal, 1 the port, the link or a report cannot be had, "
+        "or a report not be written whole, 2 wrong options. "
+        "With run: that of COMMAND; "
+        "126 it cannot be executed, 127 it is not there, 128+N signal N ended it; 3 with --strict.",
         NULL,
         NULL,
         NULL};

@@ -119,4 +119,4 @@ static void see(observer *o, const observation *seen)
     }
 }
 
-void recorder_close(recorder *r) { recording_close(&r->to); }
+bool recorder_close(recorder *r) { return recording_close(&r->to); }

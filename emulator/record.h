@@ -19,6 +19,7 @@ typedef struct {
 bool recorder_open(recorder *r, const char *path);
 /* What a controller is at the beginning: called once for each, when it is set up and before anything has happened. */
 void recorder_introduce(recorder *r, const char *name, const instrument *ins);
-void recorder_close(recorder *r);
+/* False: the file could not be written whole, which stderr has been told. */
+bool recorder_close(recorder *r);
 
 #endif

@@ -37,6 +37,7 @@ bool trace_open(trace *t, const char *path, bool has_names)
 static void give_up(trace *t)
 {
     (void)fprintf(stderr, "dryrig-emu: the trace ends here, %s cannot be written: %s\n", t->path, strerror(errno));
+    t->is_incomplete = t->file != stderr;
     if (t->file != stderr)
         (void)fclose(t->file);
     t->file = NULL;
@@ -202,12 +203,16 @@ static void see(observer *o, const observation *seen)
     }
 }
 
-void trace_close(trace *t)
+bool trace_close(trace *t)
 {
-    if (t->file == NULL)
-        return;
-    tell_streamed(t);
-    if (fflush(t->file) != 0 || (t->file != stderr && fclose(t->file) != 0))
+    if (t->file != NULL)
+        tell_streamed(t);  /* which may be what cannot be written */
+    if (t->file == stderr) /* who has closed it does not want to know */
+        (void)fflush(stderr);
+    else if (t->file != NULL && fclose(t->file) != 0) {
         (void)fprintf(stderr, "dryrig-emu: %s is incomplete: %s\n", t->path, strerror(errno));
+        t->is_incomplete = true;
+    }
     t->file = NULL;
+    return !t->is_incomplete;
 }

@@ -27,10 +27,12 @@ typedef struct {
     uint32_t streamed_count;
     const instrument *stopped; /* STOP on its ROE has just ended a move */
     uint32_t lost;             /* lines that nobody took, since one was */
+    bool is_incomplete;        /* the file could not be written */
 } trace;
 
 /* Opens a file, or stderr where path is "-"; one whose name ends in .jsonl gets JSON lines. False: errno says why. */
 bool trace_open(trace *t, const char *path, bool has_names);
-void trace_close(trace *t);
+/* False: the file could not be written whole, which stderr has been told. */
+bool trace_close(trace *t);
 
 #endif

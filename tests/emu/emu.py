@@ -132,6 +132,15 @@ def directory():
         yield path
 
 
+class InDirectory(unittest.TestCase):
+    """A test that has a directory of its own."""
+
+    def setUp(self):
+        context = directory()
+        self.directory = context.__enter__()
+        self.addCleanup(context.__exit__, None, None, None)
+
+
 def wait_until(condition, what):
     end = time.monotonic() + LIMIT_S
     while not condition():

@@ -4,17 +4,14 @@ import pty
 import signal
 import subprocess
 import tempfile
-import unittest
 
 import emu
 from emu import ACTIVE, Emulator, Port, outcome
 
 
-class Link(unittest.TestCase):
+class Link(emu.InDirectory):
     def setUp(self):
-        context = emu.directory()
-        self.directory = context.__enter__()
-        self.addCleanup(context.__exit__, None, None, None)
+        super().setUp()
         self.link = os.path.join(self.directory, "rig")
 
     def killed(self):

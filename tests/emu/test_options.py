@@ -162,9 +162,11 @@ class Trace(unittest.TestCase):
         self.assertLess(len(lines), 20)  # the stream is one line
 
     def test_a_full_disk_is_said_once_and_stops_nothing(self):
-        with Emulator("mpc", "--trace", "/dev/full", "--pace", "off") as e, Port(e.path) as port:
+        e = Emulator("mpc", "--trace", "/dev/full", "--pace", "off")
+        with Port(e.path) as port:
             for _ in range(50):
                 self.assertEqual(port.ask(b"K", 4), emu.ACTIVE[1])
+        self.assertEqual(e.stop(), 1)
         self.assertEqual(e.err.count("/dev/full"), 1)
 
     def test_stderr_that_is_gone_stops_nothing(self):

@@ -25,11 +25,9 @@ def replay(path, port, *options):
     return done.returncode, done.stdout, done.stderr
 
 
-class Port(unittest.TestCase):
+class Port(emu.InDirectory):
     def setUp(self):
-        context = emu.directory()
-        self.directory = context.__enter__()
-        self.addCleanup(context.__exit__, None, None, None)
+        super().setUp()
         self.path = os.path.join(self.directory, "line.rec")
 
     def write(self, text):

@@ -52,11 +52,9 @@ def told(events):
     return out
 
 
-class Session(unittest.TestCase):
+class Session(emu.InDirectory):
     def setUp(self):
-        context = emu.directory()
-        self.directory = context.__enter__()
-        self.addCleanup(context.__exit__, None, None, None)
+        super().setUp()
         self.scenario = os.path.join(self.directory, "scenario")
         with open(self.scenario, "w", encoding="ascii") as file:
             file.writelines(f"fault {name} chance {percent}%\n" for name, percent in FAULTS.items())

@@ -3,7 +3,6 @@ import json
 import os
 import subprocess
 import sys
-import unittest
 
 import emu
 from ctl import ctl
@@ -20,11 +19,9 @@ controllers = (
 """
 
 
-class Rig(unittest.TestCase):
+class Rig(emu.InDirectory):
     def setUp(self):
-        context = emu.directory()
-        self.directory = context.__enter__()
-        self.addCleanup(context.__exit__, None, None, None)
+        super().setUp()
         self.path = os.path.join(self.directory, "rig.cfg")
         self.link = os.path.join(self.directory, "link")
 

@@ -1,11 +1,11 @@
 """`dryrig-emu run`: the command's exit status, signals, streams and environment are its own, and nothing is left behind."""
 import os
+import resource
 import shutil
 import signal
 import subprocess
 import sys
 import threading
-import unittest
 
 import emu
 
@@ -20,13 +20,9 @@ sys.stdout.buffer.write(got)
 """
 
 
-class Run(unittest.TestCase):
+class Run(emu.InDirectory):
     def setUp(self):
-        self.directory = self.enterContext(emu.directory()) if hasattr(self, "enterContext") else None
-        if self.directory is None:
-            context = emu.directory()
-            self.directory = context.__enter__()
-            self.addCleanup(context.__exit__, None, None, None)
+        super().setUp()
         self.environment = dict(os.environ, TMPDIR=self.directory)
 
     def tearDown(self):
@@ -195,6 +191,33 @@ class Run(unittest.TestCase):
         self.assertIsNone(process.poll())
         process.send_signal(signal.SIGUSR2)
         self.assertEqual(process.wait(timeout=emu.LIMIT_S), 5)
+
+    def test_what_cannot_be_written_is_no_success(self):
+        ask = 'exec 3<>"$DRYRIG_PORT"; printf K >&3; head -c 4 <&3 >/dev/null; exit '
+        for option in ("--lint-json", "--lint-junit", "--trace"):
+            for status, ours in ((0, 1), (7, 7)):
+                done = self.run_("mpc", option, "/dev/full", "--", "sh", "-c", ask + str(status))
+                self.assertEqual(done.returncode, ours, option)
+                self.assertIn(b"/dev/full", done.stderr)
+        early = 'exec 3<>"$DRYRIG_PORT"; printf KK >&3; head -c 8 <&3 >/dev/null'
+        done = self.run_("mpc", "--strict", "--lint-json", "/dev/full", "--", "sh", "-c", early)
+        self.assertEqual(done.returncode, 3)
+        self.assertIn(b"early-command", done.stderr)
+
+    def test_a_disk_that_fills_up_is_no_success(self):
+        """A recording or a trace of 300 questions has more than 8 kB; a limit on the size of files stands for the disk."""
+        host = HOST.replace('os.write(port, b"K")', 'for i in range(300):\n  os.write(port, b"K")').replace(
+            'got = b""', '  got = b""').replace("while", "  while")
+        path = os.path.join(self.directory, "report")
+        for option in ("--record", "--trace", "--lint-json"):
+            for limit, status in ((1024, 1), (1 << 30, 0)):
+                done = subprocess.run([emu.PROGRAM, "run", "mpc", option, path, "--", sys.executable, "-c", host],
+                                      capture_output=True, env=self.environment, timeout=emu.LIMIT_S, check=False,
+                                      restore_signals=False,  # SIGXFSZ stays ignored: writing fails
+                                      preexec_fn=lambda most=limit: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
+                self.assertEqual((done.returncode, done.stdout), (status, b"\x01\x21\x03\r"), (option, done.stderr))
+                self.assertEqual(path.encode() in done.stderr, status == 1, done.stderr)
+                os.remove(path)
 
     def test_what_the_command_leaves_running_is_not_waited_for(self):
         process = self.start_('exec 3<>"$DRYRIG_PORT"; (trap "" HUP; read -u 3 x; echo "gone $x" >"$TMPDIR/late") & echo $!; exit 4')

@@ -2,7 +2,6 @@
 import os
 import subprocess
 import sys
-import unittest
 
 import emu
 from ctl import Rehearsal
@@ -12,11 +11,9 @@ CR = b"\r"
 STEP = ("--clock", "step")
 
 
-class Files(unittest.TestCase):
+class Files(emu.InDirectory):
     def setUp(self):
-        context = emu.directory()
-        self.directory = context.__enter__()
-        self.addCleanup(context.__exit__, None, None, None)
+        super().setUp()
         self.path = os.path.join(self.directory, "scenario")
 
     def write(self, text, path=None):

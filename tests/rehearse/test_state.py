@@ -5,7 +5,6 @@ import stat
 import subprocess
 import sys
 import time
-import unittest
 
 import emu
 from ctl import Rehearsal, ctl
@@ -15,11 +14,9 @@ CR = b"\r"
 STEP = ("--clock", "step")
 
 
-class Files(unittest.TestCase):
+class Files(emu.InDirectory):
     def setUp(self):
-        context = emu.directory()
-        self.directory = context.__enter__()
-        self.addCleanup(context.__exit__, None, None, None)
+        super().setUp()
         self.path = os.path.join(self.directory, "state")
 
     def text(self):
@@ -278,8 +275,8 @@ class Refused(Files):
 
     def test_a_disk_that_is_full_is_told_once_and_the_old_state_stays(self):
         self.made()
-        with self.start(clock=()) as e:
-            before = self.text()
+        before = self.text()
+        with self.assertRaisesRegex(AssertionError, "exit status 1"), self.start(clock=()) as e:
             os.mkdir(self.path + ".new")
             for i in range(3):
                 e.do(f"set position {i + 1},0,0")
@@ -287,7 +284,11 @@ class Refused(Files):
             self.assertEqual(self.text(), before)
         self.assertEqual(e.err.count("cannot be kept"), 1)
         self.assertEqual(self.text(), before)
-        os.rmdir(self.path + ".new")
+        with self.start(clock=()) as e:  # and once there is room, all is well
+            e.do("set position 4,0,0")
+            self.assertEqual(self.text(), before)
+            os.rmdir(self.path + ".new")
+        self.assertIn("[ 4, 0, 0 ]", self.text())
 
 
 if __name__ == "__main__":

@@ -432,7 +432,7 @@ static int open_rest(bridge *b)
     else
         status = start_and_run(b, after_crash);
     journal_close(&b->journal);
-    recording_close(&b->recording);
+    (void)recording_close(&b->recording);
     if (o->link != NULL)
         link_remove(o->link, b->host.path, link_lock);
     control_close(&b->control);

@@ -66,6 +66,7 @@ static void check(recording *r, bool done)
     say("%s: the recording ends here, %s cannot be written: %s\n", r->program, r->path, strerror(errno));
     (void)fclose(r->file);
     r->file = NULL;
+    r->is_incomplete = true;
 }
 
 /* A pipe or a terminal that has room for anything has room for what is written at once. */
@@ -116,11 +117,14 @@ void recording_event(recording *r, uint64_t when_us, uint64_t real_us, const cha
         check(r, dr_recording_event(r->file, when_us, real_us, name, text));
 }
 
-void recording_close(recording *r)
+bool recording_close(recording *r)
 {
     if (r->file != NULL && r->lost > 0)
         say("%s: %s is incomplete: nobody took its last %u lines\n", r->program, r->path, (unsigned)r->lost);
-    if (r->file != NULL && fclose(r->file) != 0)
+    if (r->file != NULL && fclose(r->file) != 0) {
         say("%s: %s is incomplete: %s\n", r->program, r->path, strerror(errno));
+        r->is_incomplete = true;
+    }
     r->file = NULL;
+    return !r->is_incomplete;
 }

@@ -17,6 +17,7 @@ typedef struct {
     bool is_file;               /* which always has room */
     uint32_t lost;              /* lines that nobody took, since one was */
     bool told_loss;
+    bool is_incomplete; /* the file could not be written */
 } recording;
 
 /* A file to be written. A pipe may wait for its reader. NULL: errno says why. */
@@ -24,8 +25,8 @@ FILE *recording_file(const char *path);
 
 /* Both texts stay the caller's. A pipe may wait for its reader. False: errno says why. */
 bool recording_open(recording *r, const char *program, const char *path);
-/* What was lost at the end is told. */
-void recording_close(recording *r);
+/* What was lost at the end is told. False: something could not be written, which stderr has been told. */
+bool recording_close(recording *r);
 
 void recording_set(recording *r, const char *name, const char *key, const char *value);
 /* kind: a dr_recorded_kind of bytes. The times are those of dr_recording.h. */
