@@ -36,7 +36,7 @@ static bool is_younger(const struct timespec *a, const struct timespec *b)
     return a->tv_sec > b->tv_sec || (a->tv_sec == b->tv_sec && a->tv_nsec > b->tv_nsec);
 }
 
-/* Is what stands at link_path a link of ours whose emulator is gone? If not, why[] says what it is. */
+/* Is what stands at link_path a link of ours whose program is gone? If not, why[] says what it is. */
 static bool is_stale(const char *link_path, const char *pts_path, char *why, size_t room)
 {
     struct stat link_is, port_is;
@@ -116,7 +116,7 @@ int link_make(const char *link_path, const char *pts_path, char *why, size_t roo
 {
     const int lock = link_lock_name(link_path);
     if (lock < 0 && errno == EADDRINUSE)
-        (void)snprintf(why, room, "%s is in use by another emulator; stop that, or choose another path", link_path);
+        (void)snprintf(why, room, "%s is in use by another program; stop that, or choose another path", link_path);
     else if (lock < 0)
         (void)snprintf(why, room, "cannot make the link %s: %s", link_path, strerror(errno));
     else if (make_locked(link_path, pts_path, why, room))

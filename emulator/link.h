@@ -1,8 +1,8 @@
 /* link: the stable name of a port: a symbolic link to /dev/pts/N, whose N changes with every start.
  *
- * Whose link is it? An emulator holds a lock on the link's name for as long as it lives: a socket of Linux's abstract
- * namespace, which leaves nothing behind, even after kill -9 (a lock file would). With the lock in hand, what stands at that
- * path belongs to no emulator that lives. It is a stale one of ours, and may be replaced, when it leads to a /dev/pts/N that
+ * Whose link is it? A program (an emulator, a guard) holds a lock on the link's name for as long as it lives: a socket of
+ * Linux's abstract namespace, which leaves nothing behind, even after kill -9 (a lock file would). With the lock in hand, what
+ * stands at that path belongs to no program that lives. It is a stale one of ours, and may be replaced, when it leads to a /dev/pts/N that
  * does not exist or that was made after the link: a number that was given to somebody else since. Anything else is
  * somebody's and stays, another program's link to its own living terminal as well.
  *

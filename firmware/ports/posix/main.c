@@ -12,6 +12,7 @@
 #include "ctl.h"
 #include "explain.h"
 #include "image.h"
+#include "paths.h"
 #include "retell.h"
 
 #include <argp.h>
@@ -60,6 +61,15 @@ static unsigned read_number(const struct argp_state *state, const char *name, co
     if (number < least || number > most)
         argp_error(state, "%s %s: expected a whole number from %u to %u", name, text, least, most);
     return (unsigned)number;
+}
+
+/* One file in two roles would be overwritten by one of them. */
+static void keep_apart(const struct argp_state *state, const path_use *uses, size_t count)
+{
+    size_t a, b;
+    if (paths_clash(uses, count, &a, &b))
+        argp_error(state, "%s %s and %s %s are the same file; choose another path for one of them", uses[a].option,
+                   uses[a].path, uses[b].option, uses[b].path);
 }
 
 /* -- run --------------------------------------------------------------------------------------------------------------- */
@@ -111,6 +121,14 @@ static error_t parse_run(int key, char *value, struct argp_state *state)
             argp_error(state, "--port is missing: where is the controller?");
         if (o->config == NULL)
             argp_error(state, "--config is missing: what are the limits of this rig?");
+        keep_apart(state,
+                   (const path_use[]){{"--port", o->port, false},
+                                      {"--config", o->config, false},
+                                      {"--link", o->link, true},
+                                      {"--control", o->control, true},
+                                      {"--log", o->log, false},
+                                      {"--record", o->record, false}},
+                   6);
         break;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -212,6 +230,10 @@ static error_t parse_log(int key, char *value, struct argp_state *state)
             argp_error(
                 state,
                 "--record needs --config, and the other way round: a log does not tell which controller it is of");
+        keep_apart(state,
+                   (const path_use[]){
+                       {"the log", o->path, false}, {"--config", o->config, false}, {"--record", o->record, false}},
+                   3);
         break;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -231,9 +253,11 @@ static int retell_log(journal_reader *reader, const log_options *o)
     char why[RIG_WHY_MAX] = "";
     if (!read_config(&r, o->config))
         return EXIT_CONFIG;
-    FILE *const to = fopen(o->record, "we");
+    FILE *const to = recording_may_replace(o->record) ? fopen(o->record, "we") : NULL;
     if (to == NULL) {
-        (void)snprintf(why, sizeof why, "%s: %s", o->record, strerror(errno));
+        (void)snprintf(why, sizeof why, "%s: %s", o->record,
+                       errno == EEXIST ? "holds something else than a recording: it stays. Choose another path"
+                                       : strerror(errno));
         return refuse_log(why, EXIT_CANNOT);
     }
     const bool is_told = retell(reader, &r, to, why, sizeof why);

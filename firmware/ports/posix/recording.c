@@ -19,8 +19,7 @@ FILE *recording_file(const char *path)
     return !is_pipe ? fopen(path, "we") : pipe_fd < 0 ? NULL : fdopen(pipe_fd, "w");
 }
 
-/* May it be written over? A slip must not cost a configuration or a log: only what is empty, a recording, or no file. */
-static bool may_replace(const char *path)
+bool recording_may_replace(const char *path)
 {
     static const char begins[] = "dryrig-recording ";
     char start[sizeof begins - 1];
@@ -32,6 +31,7 @@ static bool may_replace(const char *path)
         file != NULL && fread(start, sizeof start, 1, file) == 1 && memcmp(start, begins, sizeof start) == 0;
     if (file != NULL)
         (void)fclose(file);
+    errno = EEXIST;
     return is_ours;
 }
 
@@ -39,7 +39,7 @@ bool recording_open(recording *r, const char *program, const char *path)
 {
     struct stat is;
     *r = (recording){.program = program, .path = path};
-    if (!may_replace(path)) {
+    if (!recording_may_replace(path)) {
         say("%s: %s holds something else than a recording: it stays. Choose another path\n", program, path);
         errno = EEXIST;
         return false;

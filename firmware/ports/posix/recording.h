@@ -23,6 +23,10 @@ typedef struct {
 /* A file to be written. A pipe may wait for its reader. NULL: errno says why. */
 FILE *recording_file(const char *path);
 
+/* May it be written over? A slip must not cost a configuration or a log: only what is empty, a recording, or no file. False:
+ * errno is EEXIST. */
+bool recording_may_replace(const char *path);
+
 /* Both texts stay the caller's. A pipe may wait for its reader. False: errno says why. */
 bool recording_open(recording *r, const char *program, const char *path);
 /* What was lost at the end is told. False: something could not be written, which stderr has been told. */
