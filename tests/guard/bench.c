@@ -491,6 +491,20 @@ void place_tip(uint8_t drive, uint32_t x, uint32_t y, uint32_t z)
     TEST_ASSERT_TRUE(dr_controller_poke(&rig.controller, clock_now(), &hand));
 }
 
+/* -- A line that hangs -------------------------------------------------------------------------------------------------------- */
+
+void line_hangs(void)
+{
+    rig.to_device_busy = true;
+    rig.to_device_at = UINT64_MAX;
+}
+
+void line_goes_on(void)
+{
+    rig.to_device_at = rig.now;
+    settle_world();
+}
+
 /* -- The test as the controller ---------------------------------------------------------------------------------------------- */
 
 void device_says(const void *bytes, size_t count)

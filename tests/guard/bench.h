@@ -112,6 +112,9 @@ void device_at_home(void);                                                /* of 
 /* As bench_start() and bench_arm(), with the test as a controller that stands where `says` says. */
 void bench_start_by_hand(void (*says)(void));
 void bench_arm_by_hand(void (*says)(void));
+/* Nothing more leaves the guard, in the middle of a frame or before it, until the line goes on. */
+void line_hangs(void);
+void line_goes_on(void);
 /* The next byte that the guard sent; -1: none. */
 int wire_next(void);
 /* How many bytes of this value, frames of this code, the guard has sent so far. */

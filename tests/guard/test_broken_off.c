@@ -300,6 +300,18 @@ static void limits_that_are_damaged_stop_what_is_under_way_and_nothing_else(void
     TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
     TEST_ASSERT_EQUAL(1, wire_stops());
     TEST_ASSERT_FALSE(dr_guard_due(&rig.guard, &when));
+    armed(DR_TRIO, 0);
+    line_hangs();
+    host_value('A', 45); /* a setting of which nothing has left: it does not leave any more */
+    host_bytes("S", 1);  /* half a frame of the host's: nobody waits for the rest */
+    rig.limits.margin_q ^= 1;
+    TEST_ASSERT_FALSE(dr_guard_self_check(&rig.guard, (dr_us)(rig.clock_at_start + rig.now)));
+    TEST_ASSERT_FALSE(dr_guard_due(&rig.guard, &when));
+    const uint32_t sent = rig.wire_count;
+    line_goes_on();
+    run_us(1000000);
+    TEST_ASSERT_EQUAL(sent + 1, rig.wire_count);
+    TEST_ASSERT_EQUAL(1, wire_stops());
     armed(DR_MPC, 0);
     host_line(15, 84000, 80000, 80000);
     run_us(2000);
@@ -310,6 +322,33 @@ static void limits_that_are_damaged_stop_what_is_under_way_and_nothing_else(void
     run_us(1000000);
     TEST_ASSERT_EQUAL(1, wire_stops());
     TEST_ASSERT_EQUAL_HEX8(0x03, rig.wire[rig.wire_count - 1]);
+}
+
+static void each_kind_of_calibration_takes_a_minute_and_loses_the_frame_when_it_is_cut_off(void)
+{
+    static const struct {
+        uint8_t kind, code;
+        uint16_t firmware;
+    } kinds[] = {{DR_TRIO, 'R', DR_FIRMWARE_TRIO}, {DR_MPC, 'N', DR_FIRMWARE_MPC}, {DR_MPC, 'N', 0x0103}};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        if (kinds[i].kind == DR_TRIO)
+            bench_trio();
+        else
+            bench_mpc();
+        rig.limits.firmware = rig.controller.firmware = kinds[i].firmware;
+        rig.limits.rig |= DR_RIG_MAY_CALIBRATE;
+        bench_start();
+        bench_arm();
+        rig.watch_tip = false; /* it goes beyond 0 */
+        input(DR_INPUT_MAY_CALIBRATE, true);
+        host_code(kinds[i].code);
+        run_us(20000);
+        TEST_ASSERT_UINT32_WITHIN(20000, 60000000, rig.guard.at[DR_TIMER_TASK] - (dr_us)(rig.clock_at_start + rig.now));
+        run_us(200000);
+        TEST_ASSERT_TRUE(status().state == DR_GUARD_MOVING_S || status().state == DR_GUARD_MOVING_U);
+        cables(true, false);
+        TEST_ASSERT_TRUE(rig.guard.scene.frame_lost);
+    }
 }
 
 int main(void)
@@ -330,5 +369,6 @@ int main(void)
     RUN_TEST(a_fault_says_why_it_stops);
     RUN_TEST(a_fault_at_rest_breaks_nothing_off);
     RUN_TEST(limits_that_are_damaged_stop_what_is_under_way_and_nothing_else);
+    RUN_TEST(each_kind_of_calibration_takes_a_minute_and_loses_the_frame_when_it_is_cut_off);
     return UNITY_END();
 }

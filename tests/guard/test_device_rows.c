@@ -372,6 +372,15 @@ static void row_58_a_knob_that_is_being_turned_is_read_twice(void)
     device_at(40110, 40000, 40000, 30); /* 1.25 um on: as a knob can */
     run_ms(5);
     expect_state(DR_GUARD_MOVING_U);
+    device_says("\r", 1);
+    run_ms(4);
+    device_at(41000, 40000, 40000, 30);
+    expect_cr();
+    host_axis('x', 40000); /* the next motion is not believed sooner */
+    run_ms(4);
+    device_at(41100, 40000, 40000, 30);
+    run_ms(5);
+    expect_state(DR_GUARD_CHECKING);
 }
 
 static void row_45_an_angle_that_is_news_is_read_until_two_agree(void)
@@ -1258,6 +1267,12 @@ static void what_waits_for_a_torn_controller_is_forgotten(void)
     dr_guard_push_host(&rig.guard, 0, (const uint8_t *)"\x03", 1);
     TEST_ASSERT_TRUE(dr_guard_is_mid_frame(&rig.guard));
     TEST_ASSERT_EQUAL(0, dr_guard_pull_device(&rig.guard, 0, bytes, sizeof bytes));
+    dr_guard_input(&rig.guard, 0, DR_INPUT_CONFIRM, true); /* its power was off: it counts from the start */
+    for (unsigned i = 0; i < 11; i++)
+        dr_guard_push_host(&rig.guard, 0, (const uint8_t *)"\x03", 1);
+    TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+    dr_guard_push_host(&rig.guard, 0, (const uint8_t *)"\x03", 1);
+    TEST_ASSERT_TRUE(dr_guard_is_mid_frame(&rig.guard));
 }
 
 /* One that has been proved hears each ^C, answered or not. */

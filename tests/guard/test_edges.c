@@ -428,6 +428,27 @@ static void noise_after_the_fault_changes_nothing(void)
     TEST_ASSERT_EQUAL(40, status().quarantined_bytes);
 }
 
+static void a_fault_takes_back_what_has_not_begun_to_leave_and_lets_queries_pass(void)
+{
+    by_hand_idle();
+    line_hangs();
+    host_value('A', 45); /* waits for the line */
+    device_says("?????????????????", 17);
+    expect_fault(DR_FAULT_DEVICE_NOISE);
+    const uint32_t before = rig.wire_count;
+    line_goes_on();
+    run_ms(10);
+    TEST_ASSERT_EQUAL(before, rig.wire_count); /* settings do not pass in FAULT */
+    line_hangs();
+    host_code('c');
+    device_says("?", 1); /* more noise in the same second is no second fault, and takes nothing back */
+    line_goes_on();
+    run_us(500);
+    TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
+    says_at(40000, 40000, 40000);
+    TEST_ASSERT_EQUAL(14, rig.heard_count - rig.heard_taken);
+}
+
 /* -- Identity -------------------------------------------------------------------------------------------------------------- */
 
 static void a_trio_at_0_degrees_is_told_by_its_axes(void)
@@ -988,25 +1009,31 @@ static void damage_in_the_pause_within_s_finishes_the_frame_and_stops(void)
     TEST_ASSERT_EQUAL(stops + 2, wire_stops());
 }
 
+/* A TRIO that calibrates when its power comes back, which was cut for a stop: everything is over but for the CONFIRM. */
+static void cut_off(void)
+{
+    bench_trio();
+    rig.limits.rig |= DR_RIG_HAS_CUT | DR_RIG_CALIBRATES_AT_POWER_ON;
+    bench_start();
+    bench_arm();
+    host_axis('x', 41600);
+    run_ms(20);
+    stop_input(true);
+    run_ms(2000);
+    stop_input(false);
+    run_ms(30);
+    clear_fault();
+    expect_state(DR_GUARD_DISARMED);
+    TEST_ASSERT_TRUE(status().cut);
+}
+
 /* The power comes back while a setting of the host's waits to leave, or is half out: it is forgotten. */
 static void power_that_comes_back_finds_nothing_on_its_way(void)
 {
     for (unsigned half_out = 0; half_out < 2; half_out++) {
         uint8_t byte;
         const uint8_t angle[] = {'A', 30};
-        bench_trio();
-        rig.limits.rig |= DR_RIG_HAS_CUT | DR_RIG_CALIBRATES_AT_POWER_ON;
-        bench_start();
-        bench_arm();
-        host_axis('x', 41600);
-        run_ms(20);
-        stop_input(true);
-        run_ms(2000);
-        stop_input(false);
-        run_ms(30);
-        clear_fault();
-        expect_state(DR_GUARD_DISARMED);
-        TEST_ASSERT_TRUE(status().cut);
+        cut_off();
         dr_guard_push_host(&rig.guard, guard_clock(), angle, 2);
         TEST_ASSERT_EQUAL(half_out, dr_guard_pull_device(&rig.guard, guard_clock(), &byte, half_out));
         dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_CONFIRM, true);
@@ -1015,6 +1042,45 @@ static void power_that_comes_back_finds_nothing_on_its_way(void)
         run_ms(1200);
         expect_state(DR_GUARD_DISARMED);
     }
+}
+
+/* An answer to ARM, before the controller is ready, proves nothing. */
+static void power_that_comes_back_ends_an_arming(void)
+{
+    cut_off();
+    press(DR_INPUT_ARM);
+    run_ms(1);
+    press(DR_INPUT_CONFIRM);
+    const uint32_t before = rig.wire_count;
+    run_ms(999);
+    TEST_ASSERT_EQUAL(before, rig.wire_count);
+    expect_state(DR_GUARD_LOCKED);
+    run_ms(100);
+    expect_state(DR_GUARD_DISARMED);
+}
+
+/* The cut was asked for before the cable was plugged in anew. The rest of the line has nobody left to wait for it. */
+static void power_that_comes_back_finds_no_line_in_its_pause(void)
+{
+    bench_mpc();
+    rig.limits.rig |= DR_RIG_HAS_CUT;
+    rig.limits.host_loss = DR_HOST_LOSS_FINISH;
+    bench_start();
+    bench_arm();
+    rig.guard.cut = true;
+    rig.guard.sealed = 0;
+    host_line(15, 84000, 80000, 80000);
+    run_ms(12);
+    TEST_ASSERT_EQUAL(2, rig.guard.out_at);
+    cables(false, true);
+    rig.framer.have = rig.framer.want = 0; /* M1: half a frame that somebody has switched off is none */
+    press(DR_INPUT_CONFIRM);
+    TEST_ASSERT_FALSE(status().cut);
+    TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+    TEST_ASSERT_EQUAL(0, rig.guard.running >> DR_TIMER_SEND & 1);
+    const uint32_t before = rig.wire_count;
+    run_ms(999);
+    TEST_ASSERT_EQUAL(before, rig.wire_count);
 }
 
 /* Only what has begun may finish without its host. */
@@ -1246,5 +1312,8 @@ int main(void)
     RUN_TEST(a_cut_needs_its_confirmation_after_the_fault_is_cleared);
     RUN_TEST(a_wiring_alarm_outlives_the_key);
     RUN_TEST(codes_beside_the_axes);
+    RUN_TEST(a_fault_takes_back_what_has_not_begun_to_leave_and_lets_queries_pass);
+    RUN_TEST(power_that_comes_back_ends_an_arming);
+    RUN_TEST(power_that_comes_back_finds_no_line_in_its_pause);
     return UNITY_END();
 }

@@ -103,6 +103,40 @@ static void without_y_only_homing_may_end(void)
     expect_fault(DR_FAULT_WRONG_END);
 }
 
+static uint8_t active;
+static void active_says_home(void) { device_at_drive(active + 1u, 80000, 80000, 80000); }
+
+/* [M table 3]: switch 8 of a drive leaves its Y out of homing, and no other's. */
+static void each_drive_has_a_switch_of_its_own_for_y(void)
+{
+    for (active = 0; active < 2; active++)
+        for (uint8_t locked_out = 0; locked_out < 2; locked_out++) {
+            bench_mpc();
+            rig.limits.rig |= DR_RIG_HOME_IS_ZERO;
+            rig.limits.rig |= (uint16_t)(DR_RIG_Y_LOCKED_OUT << locked_out);
+            rig.limits.drives[active].box_q = (dr_box){{0, 0, 0}, {UM(25000), UM(25000), UM(25000)}};
+            rig.limits.drives[active].max_move_q = (uint32_t)DR_FAR_Q;
+            bench_start_by_hand(active_says_home);
+            bench_arm_by_hand(active_says_home);
+            host_code('H');
+            run_us(2000);
+            active_says_home();
+            run_us(6000);
+            expect_state(DR_GUARD_MOVING_S);
+            device_says("\r", 1);
+            run_us(2000);
+            device_at_drive(active + 1u, 0, 80000, 0);
+            run_us(100000);
+            if (active == locked_out) {
+                expect_state(DR_GUARD_IDLE);
+                expect_cr();
+            } else {
+                device_at_drive(active + 1u, 0, 80000, 0);
+                expect_fault(DR_FAULT_WRONG_END);
+            }
+        }
+}
+
 static void a_small_move_that_the_controller_ignores_has_no_cr(void)
 {
     mpc();
@@ -169,6 +203,10 @@ static void a_short_way_of_a_trio_is_no_small_move(void)
     for (unsigned i = 0; i < 5000 && rig.wire_count < before + 5; i++)
         run_us(1);
     TEST_ASSERT_EQUAL_UINT32(2000187, rig.guard.at[DR_TIMER_TASK] - guard_clock()); /* 0.625 um at 5 mm/s */
+    trio(0);
+    host_line(15, 40005, 40000, 40000);
+    leaves(40000);
+    TEST_ASSERT_FALSE(rig.guard.small);
 }
 
 static void beside_0(void) { device_at_drive(1, 10, 10, 10); }
@@ -201,5 +239,6 @@ int main(void)
     RUN_TEST(a_token_comes_back_50_ms_behind_the_first_motion);
     RUN_TEST(a_short_way_of_a_trio_is_no_small_move);
     RUN_TEST(homing_is_never_a_small_move);
+    RUN_TEST(each_drive_has_a_switch_of_its_own_for_y);
     return UNITY_END();
 }

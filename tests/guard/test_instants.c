@@ -360,6 +360,65 @@ static void tokens_for_motions_come_back_every_50_ms(void)
     TEST_ASSERT_EQUAL(0, rig.guard.running >> DR_TIMER_RATE & 1);
 }
 
+/* The host's setting is half out: it cannot have been answered yet. */
+static void an_answer_is_awaited_2_s_at_a_time_while_the_line_hangs(void)
+{
+    armed();
+    run_us(1000);
+    host_value('A', 45);
+    TEST_ASSERT_EQUAL(1, rig.guard.out_at);
+    line_hangs();
+    for (unsigned i = 0; i < 2; i++) {
+        due_in(2000000);
+        run_us(2000000);
+    }
+    TEST_ASSERT_NULL(last_record(DR_EVENT_NO_REPLY));
+    line_goes_on();
+    run_us(500);
+    device_says("\r", 1);
+    expect_cr();
+    TEST_ASSERT_NULL(last_record(DR_EVENT_NO_REPLY));
+}
+
+/* The guard's own query comes behind the frame that is half out, and rest is proved once the line goes on. */
+static void a_query_waits_2_ms_at_a_time_while_the_line_hangs(void)
+{
+    armed();
+    run_us(1000);
+    host_value('A', 45);
+    TEST_ASSERT_EQUAL(1, rig.guard.out_at);
+    line_hangs();
+    const uint32_t before = rig.wire_count;
+    stop_input(true);
+    run_us(400000); /* ^C three times, and then the query would be due */
+    due_in(2000);
+    run_us(100000);
+    due_in(2000);
+    TEST_ASSERT_EQUAL(before, rig.wire_count);
+    line_goes_on();
+    run_until_sent(before + 5);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY("\x2D\3\3\3c", rig.wire + before, 5);
+    says_at(40000);
+    run_us(100000);
+    says_at(40000);
+    expect_state(DR_GUARD_STOPPED);
+    expect_fault(DR_FAULT_NONE);
+}
+
+static void behind_an_error_of_the_hosts_line_50_ms_are_enough(void)
+{
+    proved();
+    host_code('S');
+    run_us(30000);
+    dr_guard_host_line_error(&rig.guard, guard_clock());
+    due_in(50000);
+    run_us(80000); /* 110 ms since the frame began: nothing is left of it that could be late */
+    const uint32_t before = rig.wire_count;
+    host_code('c');
+    TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
+    TEST_ASSERT_EQUAL(1, status().dropped_bytes);
+}
+
 /* -- Stops in the middle of something ------------------------------------------------------------------------------------- */
 
 static void what_is_left_of_a_reading_is_no_answer_to_ctrl_c(void)
@@ -451,6 +510,11 @@ static uint32_t lasts(int code, uint8_t level, uint32_t y, uint16_t facts)
 static void small_moves_calibrations_and_slow_lines_have_their_own_spans(void)
 {
     TEST_ASSERT_EQUAL_UINT32(100000, lasts('M', 0, 80015, 0)); /* may be ignored: 15 microsteps */
+    const uint32_t before = rig.wire_count;
+    run_us(99999);
+    TEST_ASSERT_EQUAL(before, rig.wire_count);
+    run_us(1); /* at once: asked where it is */
+    TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
     TEST_ASSERT_EQUAL_UINT32(100000, lasts('S', 15, 80000 - 15, 0));
     TEST_ASSERT_EQUAL_UINT32(2000000 + 500, lasts('M', 0, 80016, 0));     /* 1 um at 3 mm/s */
     TEST_ASSERT_EQUAL_UINT32(2000000 + 1846153, lasts('S', 0, 81600, 0)); /* 100 um at 81.25 um/s */
@@ -555,5 +619,8 @@ int main(void)
     RUN_TEST(stop_contacts_may_disagree_for_50_ms_and_bounce_for_20_ms);
     RUN_TEST(one_call_does_sixteen_things_that_are_due);
     RUN_TEST(a_flipped_bit_among_the_timers_is_no_timer);
+    RUN_TEST(an_answer_is_awaited_2_s_at_a_time_while_the_line_hangs);
+    RUN_TEST(a_query_waits_2_ms_at_a_time_while_the_line_hangs);
+    RUN_TEST(behind_an_error_of_the_hosts_line_50_ms_are_enough);
     return UNITY_END();
 }

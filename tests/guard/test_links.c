@@ -127,6 +127,54 @@ static void a_motion_may_finish_without_its_host_from_its_first_byte_on(void)
     TEST_ASSERT_EQUAL(1, wire_stops());
 }
 
+static void a_motion_whose_end_is_being_looked_for_may_finish_too(void)
+{
+    armed(0, DR_HOST_LOSS_FINISH);
+    line_is_read_for();
+    run_us(10000);
+    device_says("\r", 1);
+    line_hangs();
+    run_us(2000); /* the query for its end is there, and waits for the line */
+    cables(false, true);
+    line_goes_on();
+    run_us(500);
+    says(48000);
+    expect_state(DR_GUARD_DISARMED);
+    TEST_ASSERT_EQUAL(0, wire_stops());
+    TEST_ASSERT_NOT_NULL(last_record(DR_EVENT_ENDED));
+}
+
+static void who_has_gone_cannot_go_again(void)
+{
+    armed(0, DR_HOST_LOSS_FINISH);
+    line_is_read_for();
+    run_us(200000);
+    cables(false, true);
+    cables(false, false);
+    expect_fault(DR_FAULT_NO_DEVICE);
+    TEST_ASSERT_NULL(last_record(DR_EVENT_STOP)); /* the host had gone before, and its motion was to finish */
+    input(DR_INPUT_STOP, true);
+    run_us(50000);
+    expect_fault(DR_FAULT_STOP_WIRING);
+    cables(true, false);
+    expect_fault(DR_FAULT_STOP_WIRING); /* the controller had gone before, too */
+}
+
+/* A proof that was given up is begun anew by the key, or by the cable. */
+static void a_second_contact_begins_no_proof(void)
+{
+    begun(0, DR_HOST_LOSS_STOP);
+    run_us(200000000); /* asked ten times, in vain */
+    input(DR_INPUT_STOP, true);
+    run_us(5000000);
+    expect_state(DR_GUARD_LOCKED);
+    const uint32_t before = rig.wire_count;
+    input(DR_INPUT_STOP_2, true);
+    run_us(5000000);
+    TEST_ASSERT_EQUAL(before, rig.wire_count);
+    TEST_ASSERT_EQUAL(0, status().needs & DR_NEEDS_REST);
+}
+
 static void a_host_that_goes_clears_no_fault(void)
 {
     armed(0, DR_HOST_LOSS_FINISH);
@@ -240,5 +288,8 @@ int main(void)
     RUN_TEST(the_key_begins_no_second_proof);
     RUN_TEST(without_limits_the_key_proves_nothing);
     RUN_TEST(a_stop_wants_to_be_cleared);
+    RUN_TEST(a_motion_whose_end_is_being_looked_for_may_finish_too);
+    RUN_TEST(who_has_gone_cannot_go_again);
+    RUN_TEST(a_second_contact_begins_no_proof);
     return UNITY_END();
 }

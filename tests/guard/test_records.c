@@ -64,6 +64,10 @@ static void what_the_host_sent_in_vain_is_kept_with_its_first_bytes_and_how_many
     host_code(0x98);
     run_us(50000);
     records(DR_EVENT_DROPPED, DR_REASON_UNKNOWN, DR_OP_NONE, DR_AXES, DR_NO_ITEM, "\x98", 1, 40000);
+    host_code(0x98);
+    host_bytes("ABCDEFGHIJKLMNOPQRST", 20);
+    run_us(50000);
+    records(DR_EVENT_DROPPED, DR_REASON_RESYNC, DR_OP_NONE, DR_AXES, DR_NO_ITEM, "ABCDEFGHIJKLMNOP", 20, 40000);
     host_bytes("xab", 3);
     run_us(100000);
     records(DR_EVENT_DROPPED, DR_REASON_TORN, DR_OP_NONE, DR_AXES, DR_NO_ITEM, "xab", 3, 40000);
@@ -98,6 +102,10 @@ static void what_the_controller_says_unasked_is_kept(void)
     device_says("nonsense", 8);
     run_us(100000);
     records(DR_EVENT_IMPLAUSIBLE, 0, DR_OP_NONE, DR_AXES, DR_NO_ITEM, "nonsense", 8, 40000);
+    proved();
+    device_says("ABCDEFGHIJKLMNOPQRST", 20);
+    run_us(1000000);
+    records(DR_EVENT_QUARANTINED, 0, DR_OP_NONE, DR_AXES, DR_NO_ITEM, "ABCDEFGHIJKLMNOP", 20, 40000);
 }
 
 static void what_people_do_is_kept(void)

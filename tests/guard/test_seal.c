@@ -320,6 +320,19 @@ static void a_motion_leaves_in_time_or_is_read_for_again(void)
     }
 }
 
+static void where_the_knobs_are_locked_no_reading_is_too_old(void)
+{
+    uint8_t byte;
+    armed();
+    host(line, 14);
+    later(2000);
+    read_at_home();
+    later(5000000);
+    rig.guard.sealed = 0;
+    TEST_ASSERT_EQUAL(1, dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 1));
+    TEST_ASSERT_EQUAL('S', byte);
+}
+
 static void a_motion_that_is_late_again_and_again_is_refused(void)
 {
     armed();
@@ -364,6 +377,7 @@ int main(void)
     RUN_TEST(damage_within_a_frame_is_answered_by_silence);
     RUN_TEST(damage_forgets_no_torn_frame);
     RUN_TEST(a_motion_leaves_in_time_or_is_read_for_again);
+    RUN_TEST(where_the_knobs_are_locked_no_reading_is_too_old);
     RUN_TEST(a_motion_that_is_late_again_and_again_is_refused);
     RUN_TEST(a_query_that_was_not_pulled_leaves_nothing_to_skip);
     return UNITY_END();

@@ -97,6 +97,21 @@ static void the_log_keeps_to_the_order_of_the_line(void)
     run_us(3000);
     device_says("nonsense......", 14);
     TEST_ASSERT_TRUE(sequence_of(DR_EVENT_QUARANTINED) < sequence_of(DR_EVENT_IMPLAUSIBLE));
+    TEST_ASSERT_EQUAL_HEX8('p', last_record(DR_EVENT_QUARANTINED)->bytes[0]);
+    armed(DR_TRIO, 0);
+    line_hangs();
+    host_code('c');
+    device_says("?", 1); /* before the host's query has left */
+    line_goes_on();
+    run_us(500);
+    device_at_home();
+    TEST_ASSERT_TRUE(sequence_of(DR_EVENT_QUARANTINED) < sequence_of(DR_EVENT_REPLY));
+    line_moves();
+    for (unsigned i = 0; i < 16; i++) /* one more than is passed on */
+        host_code(3);
+    host_code('c');
+    expect_refused(DR_REASON_BUSY);
+    TEST_ASSERT_TRUE(sequence_of(DR_EVENT_DROPPED) < sequence_of(DR_EVENT_REFUSED));
 }
 
 static void nonsense_for_the_host_is_looked_into_before_anything_else_may_be_asked(void)
@@ -212,6 +227,20 @@ static void the_end_of_what_could_not_be_stopped_begins_the_proof_of_rest(void)
     TEST_ASSERT_FALSE(status().buzzer);
 }
 
+/* The proof of rest had begun at the deadline, without a second in which it could fail: a fault it is already. */
+static void a_cr_behind_the_deadline_begins_nothing(void)
+{
+    x_moves();
+    stop_input(true);
+    run_us((uint64_t)(rig.guard.at[DR_TIMER_TASK] - guard_clock()));
+    trio_says(40200);
+    device_says("\r", 1);
+    run_us(100000);
+    trio_says(40400);
+    TEST_ASSERT_EQUAL_UINT32(500000, rig.guard.at[DR_TIMER_READ] - guard_clock());
+    TEST_ASSERT_EQUAL(0, rig.guard.running >> DR_TIMER_PROOF & 1);
+}
+
 static void behind_the_cr_there_is_no_deadline(void)
 {
     line_moves();
@@ -228,10 +257,14 @@ static void without_limits_what_the_controller_says_is_counted_only(void)
     dr_guard_push_device(&rig.guard, guard_clock(), (const uint8_t *)"0123456789abcdefghij", 20);
     TEST_ASSERT_EQUAL(20, status().quarantined_bytes);
     expect_fault(DR_FAULT_LIMITS);
+    dr_us when;
+    TEST_ASSERT_FALSE(dr_guard_due(&rig.guard, &when));
     uint8_t bytes[4];
     dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_STOP, true); /* a stop passes, whatever is missing */
+    dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_STOP_2, true);
     TEST_ASSERT_EQUAL(1, dr_guard_pull_device(&rig.guard, guard_clock(), bytes, 4));
     TEST_ASSERT_EQUAL_HEX8(0x03, bytes[0]);
+    TEST_ASSERT_FALSE(dr_guard_due(&rig.guard, &when)); /* and nothing follows: rest cannot be proved */
 }
 
 /* -- The host ---------------------------------------------------------------------------------------------------------------- */
@@ -251,6 +284,35 @@ static void ctrl_c_at_rest_teaches_nothing_about_the_place(void)
     run_us(2000000);
     TEST_ASSERT_NOT_NULL(last_record(DR_EVENT_NO_REPLY));
     TEST_ASSERT_EQUAL(0, status().needs & DR_NEEDS_REST);
+}
+
+/* A TRIO's reply ends with its angle, which is 0 as often as not: no number of a drive. */
+static void a_query_chooses_no_drive(void)
+{
+    armed(DR_TRIO, 0);
+    host_code('c');
+    run_us(500);
+    device_at(40000, 40000, 40000, 0);
+    host_axis('x', 40080);
+    for (unsigned reading = 0; reading < 2; reading++) { /* another angle is news: read twice */
+        run_us(4000);
+        device_at_home();
+    }
+    run_us(6000);
+    expect_state(DR_GUARD_MOVING_U);
+}
+
+static void a_query_that_nobody_pulled_in_2_s_is_taken_back(void)
+{
+    armed(DR_TRIO, 0);
+    const uint32_t before = rig.wire_count;
+    line_hangs();
+    host_code('c');
+    run_us(2000000);
+    TEST_ASSERT_NOT_NULL(last_record(DR_EVENT_NO_REPLY));
+    line_goes_on();
+    run_us(1000000);
+    TEST_ASSERT_EQUAL(before, rig.wire_count); /* its answer would be nobody's */
 }
 
 static void a_host_may_ask_a_controller_that_fits_both(void)
@@ -354,6 +416,9 @@ static void a_changed_tip_is_told_by_the_press(void)
     TEST_ASSERT_FALSE((status().needs & DR_NEEDS_TIP) != 0);
     input(DR_INPUT_TIP_CHANGED, false); /* letting go changes no tip */
     TEST_ASSERT_FALSE((status().needs & DR_NEEDS_TIP) != 0);
+    press(DR_INPUT_TIP_CHANGED);
+    press(DR_INPUT_LOG_FAILED); /* only CONFIRM confirms */
+    TEST_ASSERT_TRUE((status().needs & DR_NEEDS_TIP) != 0);
 }
 
 static void a_fault_that_is_cleared_is_gone(void)
@@ -364,6 +429,18 @@ static void a_fault_that_is_cleared_is_gone(void)
     clear_fault();
     expect_fault(DR_FAULT_NONE);
     TEST_ASSERT_FALSE(status().buzzer);
+}
+
+static void the_key_silences_the_buzzer_where_nothing_can_be_proved_any_more(void)
+{
+    line_moves();
+    host_code(3);
+    run_us(4000000); /* rest not proved in 1 s; then no answer at all */
+    expect_fault(DR_FAULT_DEVICE_SILENT);
+    TEST_ASSERT_TRUE(status().buzzer);
+    clear_fault();
+    TEST_ASSERT_FALSE(status().buzzer);
+    expect_state(DR_GUARD_DISARMED);
 }
 
 int main(void)
@@ -391,5 +468,9 @@ int main(void)
     RUN_TEST(arming_is_for_the_disarmed_and_by_a_fresh_press);
     RUN_TEST(a_changed_tip_is_told_by_the_press);
     RUN_TEST(a_fault_that_is_cleared_is_gone);
+    RUN_TEST(a_query_chooses_no_drive);
+    RUN_TEST(a_query_that_nobody_pulled_in_2_s_is_taken_back);
+    RUN_TEST(a_cr_behind_the_deadline_begins_nothing);
+    RUN_TEST(the_key_silences_the_buzzer_where_nothing_can_be_proved_any_more);
     return UNITY_END();
 }
