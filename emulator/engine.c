@@ -350,6 +350,8 @@ void engine_run(engine *e)
         flush_all(e);
         tell_owner(e);
     }
+    for (unsigned i = 0; i < e->station_count; i++)
+        station_say(&e->stations[i], OBSERVED_END, "");
 }
 
 void engine_catch_up(engine *e)
@@ -363,6 +365,7 @@ void engine_catch_up(engine *e)
             station_take(&e->stations[i], e->now_ns);
             run_station(e, &e->stations[i], e->now_us);
         }
+    flush_all(e); /* what is answered next comes behind what the host was sent */
 }
 
 void engine_advance(engine *e, uint64_t until_us, bool until_idle)
@@ -422,10 +425,8 @@ void engine_start(engine *e)
 
 void engine_close(engine *e)
 {
-    for (unsigned i = 0; i < e->station_count; i++) {
-        station_say(&e->stations[i], OBSERVED_END, "");
+    for (unsigned i = 0; i < e->station_count; i++)
         station_unplug(&e->stations[i], e->inotify);
-    }
     free(e->station_sources);
     (void)close(e->inotify);
     (void)close(e->epoll);

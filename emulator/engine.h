@@ -59,7 +59,7 @@ bool engine_open(engine *e);
 bool engine_plug(engine *e, char *why, size_t room);
 /* Switches all instruments on. The clock begins at 0. */
 void engine_start(engine *e);
-/* Runs until is_over. */
+/* Runs until is_over; then observers are told that it is. */
 void engine_run(engine *e);
 /* Takes ports and links away. */
 void engine_close(engine *e);

@@ -13,6 +13,12 @@
 
 const char *telling_next(telling *t) { return t->words[t->at] == NULL ? NULL : t->words[t->at++]; }
 
+const char *telling_word(telling *t)
+{
+    const char *const word = telling_next(t);
+    return word == NULL ? "" : word;
+}
+
 bool telling_take(telling *t, const char *word)
 {
     if (t->words[t->at] == NULL || strcasecmp(t->words[t->at], word) != 0)
@@ -38,17 +44,16 @@ bool telling_ends(telling *t)
     return !t->is_check;
 }
 
-/* What a value's reader says, behind the word that it is about. */
-static bool about(telling *t, const char *word, const char *why)
+bool telling_about(telling *t, const char *word, const char *why)
 {
-    return telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
+    return word == NULL || *word == '\0' ? telling_wrong(t, "%s", why) : telling_wrong(t, "'%s': %s", word, why);
 }
 
 bool telling_time(telling *t, uint64_t *us)
 {
     char why[WHY_ROOM];
-    const char *const word = telling_next(t);
-    return values_time_us(word == NULL ? "" : word, us, why) || about(t, word, why);
+    const char *const word = telling_word(t);
+    return values_time_us(word, us, why) || telling_about(t, word, why);
 }
 
 /* -- Commands of the controller ------------------------------------------------------------------------------------------- */
@@ -63,8 +68,10 @@ bool telling_command(telling *t, dr_op *op)
         *op = (dr_op)command.op;
         return true;
     }
-    size_t length = 0;
-    char names[WHY_ROOM / 2] = "";
+    char why[WHY_ROOM];
+    size_t length = (size_t)snprintf(why, sizeof why, "expected a command of the %s as its letter, as ^C, or as ",
+                                     dr_words_kind((dr_kind)c->kind));
+    const char *const names = why + length;
     for (uint8_t i = 0; dr_command_row((dr_kind)c->kind, i, &command); i++) {
         const char *const name = dr_words_command((dr_op)command.op)->name;
         const bool is_stop = (command.is & DR_IS_INTERRUPT) != 0 && word != NULL && strcasecmp(word, "^C") == 0;
@@ -73,20 +80,47 @@ bool telling_command(telling *t, dr_op *op)
             *op = (dr_op)command.op;
             return true;
         }
-        if (length < sizeof names && strstr(names, name) == NULL)
-            length += (size_t)snprintf(names + length, sizeof names - length, "%s%s", i == 0 ? "" : ", ", name);
+        if (length < sizeof why && strstr(names, name) == NULL)
+            length += (size_t)snprintf(why + length, sizeof why - length, "%s%s", i == 0 ? "" : ", ", name);
     }
-    return telling_wrong(t, "'%s': expected a command of the %s as its letter, as ^C, or as %s",
-                         word == NULL ? "" : word, dr_words_kind((dr_kind)c->kind), names);
+    return telling_about(t, word, why);
 }
 
 /* -- Later: at a time, after commands -------------------------------------------------------------------------------------- */
 
+/* A line that waits for commands of a host. It may not act while it looks on, so it plans itself for that very instant. */
+typedef struct trigger trigger;
+struct trigger {
+    observer base;
+    observer_link link;
+    language *l;
+    station *s;
+    dr_op op; /* DR_OP_NONE: any */
+    unsigned left;
+    bool is_each;
+    char line[LANGUAGE_LINE];
+    trigger *next;
+};
+
+/* One that waits for a time. */
 typedef struct {
     planned base;
     language *l;
+    trigger *spent; /* what has planned it, where that is of no use any more; NULL: nothing */
     char line[LANGUAGE_LINE];
 } later;
+
+/* Not while observers look on. */
+static void forget_trigger(language *l, trigger *g)
+{
+    for (trigger **at = &l->triggers; *at != NULL; at = &(*at)->next)
+        if (*at == g) {
+            *at = g->next;
+            break;
+        }
+    station_unobserve(g->s, &g->link);
+    free(g);
+}
 
 /* What goes wrong later has nobody to tell but those who look on. */
 static void carry_out_later(language *l, const char *line)
@@ -105,24 +139,32 @@ static void carry_out_later(language *l, const char *line)
 static void strike(planned *what)
 {
     later *const it = (later *)what;
+    if (it->spent != NULL)
+        forget_trigger(it->l, it->spent);
     it->l->depth++;
     carry_out_later(it->l, it->line);
     it->l->depth--;
     free(it);
 }
 
-bool telling_later(telling *t, uint64_t when_us, const char *line, bool is_passive)
+/* NULL: no memory. */
+static later *plan(language *l, uint64_t when_us, const char *line, bool is_passive)
 {
     later *const it = calloc(1, sizeof *it);
     if (it == NULL)
-        return telling_wrong(t, "no memory");
+        return NULL;
     it->base.strike = strike;
     it->base.when_us = when_us;
     it->base.is_passive = is_passive;
-    it->l = t->l;
+    it->l = l;
     (void)snprintf(it->line, sizeof it->line, "%s", line);
-    engine_plan(t->l->e, &it->base);
-    return true;
+    engine_plan(l->e, &it->base);
+    return it;
+}
+
+bool telling_later(telling *t, uint64_t when_us, const char *line, bool is_passive)
+{
+    return plan(t->l, when_us, line, is_passive) != NULL || telling_wrong(t, "no memory");
 }
 
 static bool carry_out_words(telling *t);
@@ -172,31 +214,16 @@ static bool do_in(telling *t)
     return telling_time(t, &span_us) && rest_of(t, line) && telling_later(t, t->l->e->now_us + span_us, line, true);
 }
 
-/* A line that waits for commands of a host. It may not act while it looks on, so it plans itself for that very instant. */
-typedef struct trigger trigger;
-struct trigger {
-    observer base;
-    observer_link link;
-    language *l;
-    station *s;
-    dr_op op; /* DR_OP_NONE: any */
-    unsigned left;
-    bool is_each;
-    char line[LANGUAGE_LINE];
-    trigger *next;
-};
-
 static void see_command(observer *o, const observation *seen)
 {
     trigger *const g = (trigger *)o;
-    telling t;
     if (seen->what != OBSERVED_NOTE || seen->note->what != DR_NOTE_REQUEST || g->left == 0 ||
         (g->op != DR_OP_NONE && g->op != seen->note->op) || --g->left > 0)
         return;
-    memset(&t, 0, sizeof t);
-    t.l = g->l;
-    (void)telling_later(&t, seen->when_us, g->line, false);
+    later *const it = plan(g->l, seen->when_us, g->line, false);
     g->left = g->is_each ? 1 : 0;
+    if (it != NULL && !g->is_each)
+        it->spent = g;
 }
 
 static bool add_trigger(telling *t, dr_op op, unsigned count, bool is_each)
@@ -220,9 +247,9 @@ static bool do_after(telling *t)
 {
     unsigned count;
     char why[WHY_ROOM] = "";
-    const char *const word = telling_next(t);
-    if (!values_number(word == NULL ? "" : word, 1, 1000000, &count, why))
-        return about(t, word, why);
+    const char *const word = telling_word(t);
+    if (!values_number(word, 1, 1000000, &count, why))
+        return telling_about(t, word, why);
     if (!telling_take(t, "commands") && !telling_take(t, "command"))
         return telling_wrong(t, "expected: after 3 commands COMMAND");
     return add_trigger(t, DR_OP_NONE, count, false);
@@ -421,10 +448,6 @@ void language_close(language *l)
             free(p);
         }
     }
-    while (l->triggers != NULL) {
-        trigger *const g = l->triggers;
-        l->triggers = g->next;
-        station_unobserve(g->s, &g->link);
-        free(g);
-    }
+    while (l->triggers != NULL)
+        forget_trigger(l, l->triggers);
 }

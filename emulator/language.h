@@ -59,8 +59,9 @@ void language_close(language *l);
 
 /* -- For verbs ----------------------------------------------------------------------------------------------------------- */
 
-/* The next word, or NULL. */
+/* The next word, or NULL; or "", for who reads it as a value. */
 const char *telling_next(telling *t);
+const char *telling_word(telling *t);
 /* Is the next word this one? Then it is taken. */
 bool telling_take(telling *t, const char *word);
 /* The line has been read, and nothing may follow. False also where it is only to be checked. So a verb first reads all of its
@@ -68,6 +69,8 @@ bool telling_take(telling *t, const char *word);
 bool telling_ends(telling *t);
 /* t->why, and false. */
 __attribute__((format(printf, 2, 3))) bool telling_wrong(telling *t, const char *format, ...);
+/* What a value's reader says of a word: why begins with "expected" where there is none ("", or NULL). */
+bool telling_about(telling *t, const char *word, const char *why);
 /* The next word as a time. */
 bool telling_time(telling *t, uint64_t *us);
 /* The next word as a command of the controller: 'S', '^C' or its name. */

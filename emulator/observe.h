@@ -47,7 +47,7 @@ typedef struct {
     size_t count;
     uint32_t pause_us;    /* FROM_HOST: since the host's bytes before, in real time; UINT32_MAX: longer */
     uint32_t late_us;     /* FROM_HOST: of the time since they were told before, the emulator had no processor */
-    uint32_t unread;      /* FROM_HOST, CLOSED, END: bytes for the host that it had not read when it did this */
+    uint32_t unread;      /* FROM_HOST, CLOSED: bytes for the host that it had not read when it did this */
     bool has_read_behind; /* FROM_HOST: but then it read what it should have read before, quicker than it was seen */
     const dr_note *note;  /* NOTE */
     const struct termios *tty; /* TTY */

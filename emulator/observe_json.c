@@ -67,7 +67,7 @@ cJSON *observe_json(const observation *seen)
         add_bytes(out, seen->bytes, seen->count);
     if (seen->what == OBSERVED_FROM_HOST)
         (void)cJSON_AddNumberToObject(out, "pause_us", seen->pause_us);
-    if (seen->what == OBSERVED_FROM_HOST || seen->what == OBSERVED_CLOSED || seen->what == OBSERVED_END)
+    if (seen->what == OBSERVED_FROM_HOST || seen->what == OBSERVED_CLOSED)
         (void)cJSON_AddNumberToObject(out, "unread", seen->unread);
     if (seen->what == OBSERVED_TTY)
         (void)cJSON_AddNumberToObject(out, "baud", seen->baud);

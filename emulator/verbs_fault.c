@@ -12,20 +12,20 @@ static faults *faults_of(const telling *t) { return &t->s->ins.faults; }
 
 static bool wrong_name(telling *t, const char *name)
 {
-    char names[WHY_ROOM / 2] = "";
-    size_t length = 0;
-    for (unsigned i = 0; i < FAULTS && length < sizeof names; i++)
-        length += (size_t)snprintf(names + length, sizeof names - length, ", %s", faults_words((fault_id)i)->name);
-    return telling_wrong(t, "'%s': expected off%s", name == NULL ? "" : name, names);
+    char why[WHY_ROOM] = "expected off";
+    size_t length = strlen(why);
+    for (unsigned i = 0; i < FAULTS && length < sizeof why; i++)
+        length += (size_t)snprintf(why + length, sizeof why - length, ", %s", faults_words((fault_id)i)->name);
+    return telling_about(t, name, why);
 }
 
 static bool read_number(telling *t, uint32_t *number)
 {
     char why[WHY_ROOM];
     unsigned value;
-    const char *const word = telling_next(t);
-    if (!values_number(word == NULL ? "" : word, 1, 1000000, &value, why))
-        return telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
+    const char *const word = telling_word(t);
+    if (!values_number(word, 1, 1000000, &value, why))
+        return telling_about(t, word, why);
     *number = value;
     return true;
 }
@@ -33,9 +33,8 @@ static bool read_number(telling *t, uint32_t *number)
 static bool read_chance(telling *t, uint32_t *millionths)
 {
     char why[WHY_ROOM];
-    const char *const word = telling_next(t);
-    return values_millionths(word == NULL ? "" : word, millionths, why) ||
-           telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
+    const char *const word = telling_word(t);
+    return values_millionths(word, millionths, why) || telling_about(t, word, why);
 }
 
 static bool read_axis(telling *t, uint8_t *axis)
@@ -44,7 +43,7 @@ static bool read_axis(telling *t, uint8_t *axis)
     for (*axis = 0; *axis < DR_AXES; (*axis)++)
         if (telling_take(t, names[*axis]))
             return true;
-    return telling_wrong(t, "'%s': expected an axis: x, y or z", t->words[t->at] == NULL ? "" : t->words[t->at]);
+    return telling_about(t, t->words[t->at], "expected an axis: x, y or z");
 }
 
 /* How many times as long. */
@@ -53,7 +52,7 @@ static bool read_times(telling *t, uint8_t *times)
     char why[WHY_ROOM];
     unsigned value;
     if (!values_number(telling_next(t), 2, TIMES_MAX, &value, why))
-        return telling_wrong(t, "'%s': %s", t->words[t->at - 1], why);
+        return telling_about(t, t->words[t->at - 1], why);
     *times = (uint8_t)value;
     return true;
 }

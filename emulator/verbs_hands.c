@@ -50,8 +50,9 @@ static dr_kind kind_of(const telling *t) { return (dr_kind)t->s->ins.controller.
 static bool read_control(telling *t, const control_name *names, int *control, const char **name)
 {
     const char *const word = telling_next(t);
-    char known[128] = "";
-    size_t length = 0;
+    char why[WHY_ROOM] = "expected one of ";
+    const size_t begun = strlen(why);
+    size_t length = begun;
     for (const control_name *n = names; n->name != NULL; n++) {
         if ((n->kinds & BIT(kind_of(t))) == 0)
             continue;
@@ -60,18 +61,17 @@ static bool read_control(telling *t, const control_name *names, int *control, co
             *name = n->name;
             return true;
         }
-        if (length < sizeof known)
-            length += (size_t)snprintf(known + length, sizeof known - length, "%s%s", length > 0 ? ", " : "", n->name);
+        if (length < sizeof why)
+            length += (size_t)snprintf(why + length, sizeof why - length, "%s%s", length > begun ? ", " : "", n->name);
     }
-    return telling_wrong(t, "'%s': expected one of %s", word == NULL ? "" : word, known);
+    return telling_about(t, word, why);
 }
 
 static bool read_number(telling *t, unsigned least, unsigned most, unsigned *number)
 {
     char why[WHY_ROOM];
-    const char *const word = telling_next(t);
-    return values_number(word == NULL ? "" : word, least, most, number, why) ||
-           telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
+    const char *const word = telling_word(t);
+    return values_number(word, least, most, number, why) || telling_about(t, word, why);
 }
 
 /* -- Buttons, knobs, switches -------------------------------------------------------------------------------------------- */
@@ -139,11 +139,14 @@ static bool do_knob(telling *t)
     unsigned detents = 0;
     if (!read_control(t, knobs, &knob, &name))
         return false;
-    const char *const word = t->words[t->at];
-    const bool is_back = word != NULL && word[0] == '-';
-    if (word != NULL && (word[0] == '-' || word[0] == '+'))
-        t->words[t->at]++;
-    if (!read_number(t, 0, DETENTS_MAX, &detents) || !telling_ends(t))
+    char why[WHY_ROOM];
+    const char *const word = telling_word(t);
+    const bool is_back = word[0] == '-', is_signed = is_back || word[0] == '+';
+    if (!values_number(word + (is_signed ? 1 : 0), 0, DETENTS_MAX, &detents, why)) {
+        (void)snprintf(why, sizeof why, "expected a whole number of detents from -%u to %u", DETENTS_MAX, DETENTS_MAX);
+        return telling_about(t, word, why);
+    }
+    if (!telling_ends(t))
         return false;
     (void)dr_panel_turn(&ins_of(t)->panel, instrument_now(ins_of(t)), (dr_knob)knob,
                         (int16_t)(is_back ? -(int)detents : (int)detents));

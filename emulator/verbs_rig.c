@@ -23,15 +23,16 @@ static bool has_port(const telling *t) { return t->words[t->at] != NULL && strle
 /* The number of a port that stands next in the line, else that of the active device; as an index. */
 static bool read_port(telling *t, bool is_optional, uint8_t *drive)
 {
-    const char *const word = t->words[t->at];
     char why[WHY_ROOM];
     unsigned number;
     *drive = controller(t)->active;
     if (is_optional && !has_port(t))
         return true;
-    t->at += word != NULL;
-    if (!values_number(word == NULL ? "" : word, 1, controller(t)->drive_count, &number, why))
-        return telling_wrong(t, "'%s': %s, the port of a device", word == NULL ? "" : word, why);
+    const char *const word = telling_word(t);
+    if (!values_number(word, 1, controller(t)->drive_count, &number, why)) {
+        (void)snprintf(why, sizeof why, "expected the port of a device, 1 to %u", (unsigned)controller(t)->drive_count);
+        return telling_about(t, word, why);
+    }
     *drive = (uint8_t)(number - 1u);
     return true;
 }
@@ -290,18 +291,18 @@ static bool do_usb(telling *t)
 static bool read_point(telling *t, uint8_t drive, bool is_active, uint32_t steps[DR_AXES])
 {
     char why[WHY_ROOM] = "";
-    const char *const word = telling_next(t);
+    const char *const word = telling_word(t);
     const uint8_t count = controller(t)->drive_count;
     bool is_any_connected = false;
     for (uint8_t i = t->is_check && is_active ? 0 : drive; i < (t->is_check && is_active ? count : drive + 1u); i++) {
         const dr_stage_id id = (dr_stage_id)controller(t)->drives[i].stage;
-        if (id != DR_STAGE_NONE && values_point(word == NULL ? "" : word, id, steps, why))
+        if (id != DR_STAGE_NONE && values_point(word, id, steps, why))
             return true;
         is_any_connected = is_any_connected || id != DR_STAGE_NONE;
     }
     if (is_any_connected)
-        return telling_wrong(t, "'%s': %s", word == NULL ? "" : word, why);
-    return (t->is_check && word != NULL) || telling_wrong(t, "there is no device at port %u", drive + 1u);
+        return telling_about(t, word, why);
+    return (t->is_check && *word != '\0') || telling_wrong(t, "there is no device at port %u", drive + 1u);
 }
 
 static bool set_position(telling *t)
@@ -343,17 +344,17 @@ static bool set_home(telling *t)
 static bool set_angle(telling *t)
 {
     char why[WHY_ROOM];
-    const char *const word = t->words[t->at] == NULL ? "" : telling_next(t);
+    const char *const word = telling_word(t);
     unsigned angle_deg;
     uint8_t diagonal;
     if (controller(t)->kind == DR_TRIO) {
         if (!values_number(word, 0, DR_ANGLE_MAX_DEG, &angle_deg, why))
-            return telling_wrong(t, "'%s': %s", word, why);
+            return telling_about(t, word, why);
         return telling_ends(t) && (dr_controller_apply(controller(t), now(t), DR_EFFECT_ANGLE, (uint8_t)angle_deg) ||
                                    telling_wrong(t, "it moves or is off: the angle cannot be set now"));
     }
     if (!values_diagonal(word, &diagonal, why))
-        return telling_wrong(t, "'%s': %s", word, why);
+        return telling_about(t, word, why);
     if (!telling_ends(t))
         return false;
     controller(t)->drives[controller(t)->active].diagonal = diagonal;
@@ -369,9 +370,9 @@ static bool set_mode(telling *t)
     unsigned mode;
     if (controller(t)->kind != DR_MPC)
         return telling_wrong(t, "a TRIO has no modes");
-    const char *const word = t->words[t->at] == NULL ? "" : telling_next(t);
+    const char *const word = telling_word(t);
     if (!values_number(word, 0, 9, &mode, why))
-        return telling_wrong(t, "'%s': %s", word, why);
+        return telling_about(t, word, why);
     return telling_ends(t) && (dr_controller_apply(controller(t), now(t), DR_EFFECT_MODE, (uint8_t)mode) ||
                                telling_wrong(t, "it moves or is off: the mode cannot be set now"));
 }
@@ -392,15 +393,15 @@ static bool do_set(telling *t)
 static bool do_quirk(telling *t)
 {
     char why[WHY_ROOM];
-    const char *const name = t->words[t->at] == NULL ? "" : telling_next(t);
+    const char *const name = telling_word(t);
     if (!setup_knows_quirk(&t->s->ins, name, why))
-        return telling_wrong(t, "'%s': %s", name, why);
+        return telling_about(t, name, why);
     const bool on = telling_take(t, "on");
     if (!on && !telling_take(t, "off"))
         return telling_wrong(t, "expected on or off behind the quirk");
     if (!telling_ends(t))
         return false;
-    return setup_quirk(&t->s->ins, name, on, why) || telling_wrong(t, "'%s': %s", name, why);
+    return setup_quirk(&t->s->ins, name, on, why) || telling_about(t, name, why);
 }
 
 /* -- trace, subscribe, quit ------------------------------------------------------------------------------------------------ */

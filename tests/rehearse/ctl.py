@@ -10,12 +10,12 @@ import emu
 class Rehearsal(emu.Emulator):
     """An emulator with a control channel, in a directory of its own."""
 
-    def __init__(self, *args):
+    def __init__(self, *args, **popen):
         self.context = emu.directory()
         self.directory = self.context.__enter__()
         self.socket_path = os.path.join(self.directory, "control")
         self.link = os.path.join(self.directory, "link")
-        super().__init__(*args, "--control", self.socket_path, "--link", self.link)
+        super().__init__(*args, "--control", self.socket_path, "--link", self.link, **popen)
         self.socket = socket.socket(socket.AF_UNIX)
         self.socket.settimeout(emu.LIMIT_S)
         self.socket.connect(self.socket_path)

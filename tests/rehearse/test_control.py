@@ -1,11 +1,13 @@
 """The control channel: every verb, what it refuses and what it says then; time that moves when it is told to."""
 import json
 import os
+import re
 import select
 import socket
 import stat
 import subprocess
 import sys
+import termios
 import unittest
 
 import emu
@@ -13,6 +15,7 @@ from ctl import Rehearsal, ctl
 from emu import Port, point
 
 CR = b"\r"
+MANUAL = os.path.join(os.path.dirname(__file__), "..", "..", "emulator", "dryrig-control.7")
 
 
 class Step(unittest.TestCase):
@@ -279,6 +282,26 @@ class Later(unittest.TestCase):
             self.assertIn("Another command", e.refuses("on K"))
             self.assertIn("1000000", e.refuses("after x commands power off"))
 
+    def test_what_has_struck_is_forgotten(self):
+        """However many lines have waited and been carried out, the emulator is as big as before."""
+        environment = dict(os.environ, ASAN_OPTIONS=os.environ.get("ASAN_OPTIONS", "") + ":quarantine_size_mb=0")
+        with Rehearsal("mpc", "--clock", "step", env=environment) as e, Port(e.path) as port:
+            def many():
+                for _ in range(20):
+                    for _ in range(100):
+                        e.do("on K fault off")
+                        e.do("after 1 commands fault off")
+                        e.do("at 0s fault off")
+                    self.assertEqual(port.ask(*emu.ACTIVE[:1], 4), emu.ACTIVE[1])
+            many()
+            before = self.resident_kib(e)
+            many()  # 4,000 that wait for a command, of 600 bytes and more each
+            self.assertLess(self.resident_kib(e) - before, 1024)
+
+    def resident_kib(self, e):
+        with open(f"/proc/{e.process.pid}/status", encoding="ascii") as file:
+            return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
+
     def test_do_at_the_start(self):
         with Rehearsal("mpc", "--do", "set position 16,0,0", "--do", "quirk position-13 on") as e, Port(e.path) as port:
             self.assertEqual(port.ask(b"C", 13), point(16, 0, 0) + CR)
@@ -394,6 +417,41 @@ class Channel(unittest.TestCase):
             self.assertEqual((seen[1]["note"], seen[1]["command"], seen[1]["when_us"]), ("request", "active", 1000000))
             port.ask(b"K", 4)
             self.assertTrue(e.is_idle())
+
+    def test_every_key_and_event_is_in_the_manual_page(self):
+        with open(MANUAL, encoding="utf-8") as file:
+            section = file.read().partition(".SH LOOKING ON")[2].partition('"trace on"')[0]
+        told = set(re.findall(r"[a-z_-]+", "".join(line for line in section.splitlines(True) if line.startswith(".B"))))
+        seen = []
+        with Rehearsal("mpc", "--clock", "step") as e:
+            other = socket.socket(socket.AF_UNIX)
+            other.settimeout(emu.LIMIT_S)
+            other.connect(e.socket_path)
+            with other, other.makefile("rw", encoding="utf-8") as events:
+                events.write("subscribe\n")
+                events.flush()
+                self.assertEqual(json.loads(events.readline()), {"ok": True})
+                with Port(e.path) as port:
+                    tty = termios.tcgetattr(port.fd)
+                    tty[4] = tty[5] = termios.B57600
+                    termios.tcsetattr(port.fd, termios.TCSANOW, tty)
+                    e.do("fault slow-answer 1s on C")
+                    self.assertEqual(port.ask(b"K", 4), emu.ACTIVE[1])
+                    port.send(b"M" + point(16, 0, 0))
+                    e.do("advance until idle")
+                    port.send(b"C")
+                    e.do("advance 1ms")
+                e.do("state")  # by then it is known that nobody has the port open
+                e.do("advance until idle")
+                e.do("quit")
+                seen = [json.loads(line) for line in events]
+        self.assertEqual({"event": "end", "controller": "mpc"}, {key: seen[-1][key] for key in ("event", "controller")})
+        self.assertEqual({event["event"] for event in seen},
+                         {"from-host", "to-host", "lost", "note", "opened", "closed", "tty", "fault", "end"})
+        self.assertEqual([event["baud"] for event in seen if event["event"] == "tty"], [57600])
+        self.assertEqual([event["unread"] for event in seen if event["event"] == "closed"], [1])
+        self.assertEqual({key for event in seen for key in event} - told, set())
+        self.assertEqual({event["event"] for event in seen} - told, set())
 
     def test_a_subscriber_that_does_not_read_holds_nobody_up(self):
         with Rehearsal("mpc") as e, Port(e.path) as port:

@@ -117,6 +117,26 @@ class Wrong(Files):
         self.refused("power d\u00e9j\u00e0", 8, "byte C3", "ASCII")
         self.refused("set position " + "1" * 600, 512, "longer than 511")
 
+    def test_a_word_that_is_missing(self):
+        """What was expected there is told, behind the end of the line, and no empty word is quoted."""
+        expected = {"at": "a time", "in": "a time", "after": "a whole number", "on": "a command", "on each": "a command",
+                    "fault": "off, drop-byte", "fault stall-axis": "an axis", "fault drop-cr on": "a command",
+                    "fault drop-cr chance": "a probability", "fault drop-cr from": "a time", "press": "one of home",
+                    "hold home": "a time", "knob": "one of x", "knob x": "a whole number of detents", "switch": "one of rear",
+                    "switch rear": "a whole number", "device": "the port", "set position": "X,Y,Z", "set work": "X,Y,Z",
+                    "set angle": "7, 11", "set mode": "a whole number", "quirk": "", "advance": "a time", "power": "off",
+                    "usb": "plug", "set": "position", "trace": "on"}
+        for line, words in expected.items():
+            self.refused(line, len(line) + 1, f": expected {words}")
+            self.assertNotIn("''", emu.outcome("mpc", "--scenario", self.path)[2])
+
+    def test_knobs_turn_back_too(self):
+        for word in ("-30001", "30001", "+", "-", "--5", "x"):
+            self.refused(f"knob x {word}", 8, f"'{word}': expected a whole number of detents from -30000 to 30000")
+        self.write("knob x -30000\nknob x +30000\nknob y 1")
+        with Rehearsal("mpc", *STEP, "--scenario", self.path):
+            pass
+
     def test_a_file_that_is_none(self):
         for make, words in ((lambda: None, "No such file"), (lambda: os.mkdir(self.path), "directory")):
             make()
