@@ -406,6 +406,7 @@ static int start_and_run(bridge *b, bool after_crash)
         serve(b, fds);
     }
     come_to_rest(b);
+    orders_end(b);
     keep_mark(b, true);
     return 0;
 }

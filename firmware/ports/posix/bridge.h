@@ -61,7 +61,8 @@ typedef struct {
     dr_guard_status shown; /* what followers were told last */
     bool shown_any, said_any;
     uint8_t said_state, said_fault; /* what stderr was told last */
-    uint64_t refusals_said_us;
+    uint64_t refusals_quiet_us;     /* until then stderr hears of no more of them */
+    uint32_t refusals_left_out;     /* meanwhile */
 } bridge;
 
 /* Runs until a signal. Returns the program's exit status. */
@@ -80,5 +81,7 @@ bool orders_due(const bridge *b, uint64_t *when_us);
 void orders_continue(bridge *b);
 /* Tells followers, and people at stderr, what has changed. */
 void orders_tell(bridge *b);
+/* What they were to be told later. */
+void orders_end(bridge *b);
 
 #endif

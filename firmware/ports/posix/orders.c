@@ -15,7 +15,7 @@
 #define S_US UINT64_C(1000000)
 #define ORDER_LASTS_US (5 * S_US)
 #define CALIBRATE_LASTS_US (30 * S_US)
-#define REFUSALS_APART_US S_US /* at stderr; followers are told each */
+#define REFUSALS_APART_US S_US /* at stderr, which hears how many there were between; followers are told each */
 #define LOG_USUAL 20u
 #define NEED_BITS 16u
 
@@ -302,6 +302,8 @@ bool orders_due(const bridge *b, uint64_t *when_us)
         when = b->order_until_us;
     if (b->calibrate_until_us != 0 && b->calibrate_until_us < when)
         when = b->calibrate_until_us;
+    if (b->refusals_left_out > 0 && b->refusals_quiet_us < when)
+        when = b->refusals_quiet_us;
     *when_us = when;
     return when != UINT64_MAX;
 }
@@ -419,20 +421,46 @@ static void say_state(bridge *b, const dr_guard_status *now)
         say("  it cannot be armed: there is no --control socket\n");
 }
 
+/* Of several at once the last one is told, and how many there were beside it. */
 static void say_refusal(bridge *b, const dr_guard_status *now)
 {
     char text[GUARD_WORDS_MAX];
-    if (b->now_us < b->refusals_said_us + REFUSALS_APART_US)
+    b->refusals_left_out += now->refused - b->shown.refused;
+    if (b->now_us < b->refusals_quiet_us)
         return;
-    b->refusals_said_us = b->now_us;
+    b->refusals_left_out--;
+    b->refusals_quiet_us = b->now_us + REFUSALS_APART_US;
     (void)guard_words_verdict(text, sizeof text, &b->rig, &now->last_refusal);
     say("dryrig-guard: refused '%s': %s\n", dr_words_command((dr_op)now->last_op)->name, text);
+}
+
+static void say_left_out(bridge *b)
+{
+    const bridge_options *const o = b->options;
+    const unsigned count = b->refusals_left_out;
+    if (count == 0)
+        return;
+    if (o->control != NULL)
+        say("dryrig-guard: and %u more refused: 'dryrig-guard ctl %s log' tells each\n", count, o->control);
+    else if (o->log != NULL)
+        say("dryrig-guard: and %u more refused: %s tells each\n", count, o->log);
+    else
+        say("dryrig-guard: and %u more refused\n", count);
+    b->refusals_left_out = 0;
+}
+
+void orders_end(bridge *b)
+{
+    orders_tell(b);
+    say_left_out(b);
 }
 
 void orders_tell(bridge *b)
 {
     dr_guard_status now;
     dr_guard_get_status(&b->guard, &now);
+    if (b->now_us >= b->refusals_quiet_us)
+        say_left_out(b);
     if (b->shown_any && is_same(&now, &b->shown))
         return;
     if (b->shown_any && now.refused != b->shown.refused)
