@@ -3,10 +3,10 @@ import os
 import resource
 import signal
 import subprocess
-import unittest
 
 import emu
 import guard
+import realtime
 from guard import Guard, guarded, line, move_mpc, rig
 
 FAST = ("--pace", "off")
@@ -24,7 +24,7 @@ def read(path):
         return file.read()
 
 
-class Recording(unittest.TestCase):
+class Recording(realtime.TestCase):
     def setUp(self):
         where = emu.contextlib.ExitStack()
         self.addCleanup(where.close)
@@ -97,6 +97,19 @@ class Recording(unittest.TestCase):
             self.assertIn("holds something else than a recording: it stays", err)
         self.assertEqual(read(self.path), "precious")
 
+    def test_who_is_killed_has_recorded_all_that_went_over_the_line(self):
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST, "--position", "10um,20um,30um") as e:
+            g = Guard(directory, e.path, rig(guard.MPC), "--record", self.path)
+            with emu.Port(g.path) as port:
+                replies = [port.ask(b"C", 14) for _ in range(3)]
+                g.status() # what was under way then is done
+                g.kill()
+        lines = read(self.path).splitlines(keepends=True)
+        self.assertTrue(lines[-1].endswith("\n"), lines[-1])
+        told = b"".join(bytes.fromhex(line.split(" < ")[1]) for line in lines if " < " in line)
+        self.assertTrue(told.endswith(b"".join(replies)), lines)
+        self.replays(r"mpc: 0 of \d answers differ")
+
     def test_the_port_lost_and_found_is_told(self):
         with emu.directory() as directory:
             link = directory + "/emu"
@@ -110,7 +123,7 @@ class Recording(unittest.TestCase):
         self.replays("3 lines of events are told in the recording, not played")
 
 
-class Replaying(unittest.TestCase):
+class Replaying(realtime.TestCase):
     """A log is enough to replay what happened on the controller's line."""
 
     def told(self, g):

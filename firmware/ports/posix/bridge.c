@@ -323,6 +323,7 @@ static void serve(bridge *b, const struct pollfd *fds)
     orders_continue(b);
     orders_tell(b);
     keep_mark(b, false);
+    recording_flush(&b->recording); /* after everything that somebody waits for */
 }
 
 /* -- Starting ---------------------------------------------------------------------------------------------------------- */

@@ -117,6 +117,12 @@ void recording_event(recording *r, uint64_t when_us, uint64_t real_us, const cha
         check(r, dr_recording_event(r->file, when_us, real_us, name, text));
 }
 
+void recording_flush(recording *r)
+{
+    if (r->file != NULL)
+        check(r, fflush(r->file) == 0);
+}
+
 bool recording_close(recording *r)
 {
     if (r->file != NULL && r->lost > 0)

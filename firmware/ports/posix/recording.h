@@ -37,5 +37,7 @@ void recording_set(recording *r, const char *name, const char *key, const char *
 void recording_bytes(recording *r, uint64_t when_us, uint64_t real_us, const char *name, char kind,
                      const uint8_t *bytes, size_t count);
 void recording_event(recording *r, uint64_t when_us, uint64_t real_us, const char *name, const char *text);
+/* What is kept back goes into the file: who is killed later has recorded what came before. */
+void recording_flush(recording *r);
 
 #endif
