@@ -10,7 +10,7 @@ set(DRYRIG_TEST_ENVIRONMENT
 
 # dr_test(NAME SOURCES FILE... [LIBS TARGET...] [ARGS ARG...] [LABELS LABEL...] [TIMEOUT SECONDS])
 #   A Unity test program of that name, and a test of that name that runs it. Unity is linked; LIBS are what is tested.
-#   The name of the directory is always a label. A test may take 300 s, where nothing else is said: many times what any needs, as machines are busy.
+#   The name of the directory is always a label. A test may take 900 s, where nothing else is said: many times what any needs, as machines are busy.
 function(dr_test name)
   cmake_parse_arguments(PARSE_ARGV 1 test "" "TIMEOUT" "SOURCES;LIBS;ARGS;LABELS")
   if(NOT test_SOURCES OR test_UNPARSED_ARGUMENTS)
@@ -38,7 +38,7 @@ endfunction()
 function(dr_test_properties name)
   cmake_parse_arguments(PARSE_ARGV 1 test "" "TIMEOUT" "LABELS;ENVIRONMENT")
   if(NOT test_TIMEOUT)
-    set(test_TIMEOUT 300)
+    set(test_TIMEOUT 900)
   endif()
   get_filename_component(directory "${CMAKE_CURRENT_SOURCE_DIR}" NAME)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${test_TIMEOUT} LABELS "${directory};${test_LABELS}"
@@ -74,6 +74,6 @@ function(dr_fuzz name)
   endif()
   add_test(NAME ${name} COMMAND ${name} -max_total_time=${fuzz_SECONDS} -timeout=10 -print_final_stats=1
     "-artifact_prefix=${found}/" "${found}" ${corpus})
-  math(EXPR timeout "${fuzz_SECONDS} + 60")
+  math(EXPR timeout "${fuzz_SECONDS} + 600")
   dr_test_properties(${name} LABELS fuzz TIMEOUT ${timeout})
 endfunction()

@@ -6,7 +6,7 @@ def run(command, events, pins=None):
     """What the board sends: a list of (us, byte). Events: (us, bytes to send, or "stop", "off", "low PIN...", "open PIN...").
     Changes of pins that the command says to watch are added to `pins`: (us, pin, level)."""
     script = "".join(f"{us} {what if isinstance(what, str) else what.hex(' ')}\n" for us, what in events)
-    done = subprocess.run(command, input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=280)
+    done = subprocess.run(command, input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=800)
     if done.returncode:
         raise AssertionError(done.stderr)
     said = [line.split() for line in done.stdout.splitlines()]

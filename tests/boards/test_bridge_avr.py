@@ -87,7 +87,7 @@ def run(events, memory, controller="trio", watch=LAMP + BUZZER, low=AT_REST + KE
         path.write_bytes(memory)
         done = subprocess.run([RUNNER, "--controller", controller, "--memory", path, "--low", low, "--watch", watch,
                                "--script", "-", "atmega2560", IMAGE],
-                              input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=280)
+                              input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=800)
     if done.returncode:
         raise AssertionError(done.stderr)
     return Run(done.stdout)

@@ -30,7 +30,7 @@ def run(events, limits=True):
         subprocess.run([GUARD, "compile", text, "-o", image], check=True, stdout=subprocess.PIPE)
         script = "".join(f"{us} {what if isinstance(what, str) else what.hex(' ')}\n" for us, what in events)
         done = subprocess.run([NODE, RUNNER, RP2040JS, ROM, IMAGE, *(["--limits", image] if limits else []), "--script"],
-                              input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=280)
+                              input=script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=800)
     if done.returncode:
         raise AssertionError(done.stderr)
     said = [line.split() for line in done.stdout.splitlines()]

@@ -13,7 +13,7 @@ def main():
     if arguments[0] == "--same-as":
         here = subprocess.run([arguments[1]], stdout=subprocess.PIPE, check=True).stdout
         arguments = arguments[2:]
-    done = subprocess.run(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=280)
+    done = subprocess.run(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=800)
     said = done.stdout + done.stderr  # QEMU's semihosting talks on stderr
     if here is not None:
         lines = [line for line in said.splitlines() if not line.startswith(b"avr_board: ")]

@@ -1,11 +1,13 @@
 """Every command of both controllers through the port of dryrig-emu: exactly the documented bytes, and none after.
 
 Typed from the manuals: TRIO MP-245A quick reference, table 6; MPC-325 quick reference, table 9; and PROTOCOL.md."""
+import json
 import struct
 import time
 import unittest
 
 import emu
+from ctl import Rehearsal
 from emu import Emulator, Port, point
 
 CR = b"\r"
@@ -96,8 +98,8 @@ class Commands(unittest.TestCase):
             self.assertEqual(port.receive(1, 0.2), b"")
 
     def test_stop_at_half_way(self):
-        for kind, request in (("trio", b"S\x0f" + point(266667, TRIO_START, TRIO_START)), ("mpc", b"M" + point(400000, 0, 0))):
-            with Emulator(kind, "--pace", "off", "--speedup", "10") as e, Port(e.path) as port:
+        for kind, request in (("trio", b"S\x00" + point(266667, TRIO_START, TRIO_START)), ("mpc", b"S\x00" + point(400000, 0, 0))):
+            with Emulator(kind, "--pace", "off") as e, Port(e.path) as port:  # more than a minute
                 port.send(request)
                 self.assertEqual(port.receive(1, 0.1), b"")  # it moves
                 self.assertEqual(port.ask(b"\x03", 1), CR)
@@ -121,12 +123,15 @@ class Quirks(unittest.TestCase):
                          (b"\xff\xff\xff" + stream(16, 0, 0) + b"\xff\xff\xff" + stream(32, 0, 0) + CR, b""))
 
     def test_observed(self):
-        with Emulator("mpc", "--quirks", "observed", "--pace", "off", "--speedup", "1000") as e, Port(e.path) as port:
+        with Rehearsal("mpc", "--quirks", "observed", "--pace", "off", "--speedup", "1000") as e, Port(e.path) as port:
             port.send(b"M" + point(15, 15, 15))  # small-move-silent
             self.assertEqual(port.receive(1, 0.05), b"")
             self.assertEqual(port.ask(b"M" + point(16, 15, 15), 1), CR)
-            # s-needs-pause is judged in real time, though the clock runs 1,000 times faster
+            # s-needs-pause is judged in real time, though the clock runs 1,000 times faster: from when the emulator has read it
+            e.do("subscribe")
             port.send(b"S\x0f")
+            while json.loads(e.lines.readline()).get("bytes") != "53 0F":
+                pass
             time.sleep(0.05)
             self.assertEqual(port.ask(point(160, 0, 0), 1), CR)
             port.send(b"S\x0f" + point(320, 0, 0))

@@ -56,10 +56,9 @@ class Right(unittest.TestCase):
         # At half way of the first leg of 'H', Z has gone as far as X where the diagonal is 45 degrees; less where it is less.
         for text, is_steep in (("29", False), ("29less", False), ("29-less", False), ("29 less", False), ("29more", True), ("7", False),
                                ("45", None), ("11MORE", True)):
-            with Emulator("mpc", "--angle", text, "--position", "200000,0,200000", "--pace", "off") as e, Port(e.path) as port:
-                port.send(b"H")
-                self.assertEqual(port.receive(1, 0.1), b"")
-                self.assertEqual(port.ask(b"\x03", 1), CR)
+            with Emulator("mpc", "--angle", text, "--position", "200000,0,200000", "--clock", "jump", "--do",
+                          "on H in 500ms press stop") as e, Port(e.path) as port:
+                self.assertEqual(port.ask(b"H", 1), CR)
                 x, _, z = struct.unpack("<III", port.ask(b"C", 14)[1:13])
                 self.assertLess(x + z, 400000)
                 if is_steep is None:

@@ -162,16 +162,16 @@ class HostThatDoesNotRead(unittest.TestCase):
                 for _ in range(100):  # 140,000 bytes of answers
                     port.send(b"C" * 100)
                 port.send(b"M" + point(16000, 0, 0))
+                e.wait_for(b"does not read")
                 # It goes on: another host's position query after the move has its answer when the first has given up.
                 termios.tcflush(port.fd, termios.TCIFLUSH)
             with Port(e.path) as port:
                 def has_arrived():  # behind the answers to what the first has sent
                     termios.tcflush(port.fd, termios.TCIFLUSH)
                     port.send(b"C")
-                    return port.receive(14, 0.1) == b"\x01" + point(16000, 0, 0) + b"\r"
+                    return port.receive(14, 1.0) == b"\x01" + point(16000, 0, 0) + b"\r"
                 emu.wait_until(has_arrived, "the move's end")
             self.assertTrue(e.is_idle())
-        self.assertIn("does not read", e.err)
 
     def test_gets_whole_answers_when_it_reads_at_last(self):
         with Emulator("mpc", "--pace", "off") as e, Port(e.path) as port:
@@ -179,11 +179,15 @@ class HostThatDoesNotRead(unittest.TestCase):
                 port.send(b"C" * 100)
             e.wait_for(b"does not read")
             answer = b"\x01" + point(0, 0, 0) + b"\r"
-            got = port.receive(10000 * 14, 1.0)
-            self.assertGreater(len(got), 17000)
-            self.assertLess(len(got), 10000 * 14)
-            self.assertEqual(got, answer * (len(got) // 14))
-            self.assertTrue(port.nothing_more(ACTIVE))
+            got = port.receive(17000)
+            self.assertEqual(len(got), 17000)
+            while not got.endswith(ACTIVE[1]):  # the answer to this one may be among those that are lost
+                port.send(ACTIVE[0])
+                got += port.receive(10000 * 14, 1.0)
+            answers, rest = got.split(ACTIVE[1], 1)
+            self.assertEqual(answers, answer * (len(answers) // 14))
+            self.assertLess(len(answers), 10000 * 14)
+            self.assertEqual(rest.replace(ACTIVE[1], b""), b"")
 
     def test_a_slow_reader_loses_nothing(self):
         with Emulator("mpc", "--pace", "off") as e, Port(e.path) as port:

@@ -6,6 +6,7 @@ import unittest
 
 import emu
 import guard
+import realtime
 
 MANUAL = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "guard.md")
 with open(MANUAL, encoding="utf-8") as manual:
@@ -15,7 +16,7 @@ COMMANDS = [line for line in re.findall(r"^    (.*)$", "".join(WORDS.split("```"
 FIRST = COMMANDS.index("dryrig-guard check rig.conf") # before: building
 
 
-class TenMinutes(unittest.TestCase):
+class TenMinutes(realtime.TestCase):
     def follow(self, kind, directory, environment):
         """The commands in order. What runs in the background is waited for; `/tmp` is the test's own directory."""
         running = []

@@ -5,10 +5,10 @@ import shlex
 import signal
 import stat
 import subprocess
-import unittest
 
 import emu
 import guard
+import realtime
 from guard import Guard, line, position_mpc, rig
 
 
@@ -19,7 +19,7 @@ def config_file(directory, text=None):
     return path
 
 
-class Failing(unittest.TestCase):
+class Failing(realtime.TestCase):
     def fails(self, directory, status, words, *args):
         before = sorted(os.listdir(directory))
         code, out, err = guard.run(*args)
@@ -145,7 +145,7 @@ class Failing(unittest.TestCase):
             self.assertEqual(os.listdir(directory), ["rig.conf"])
 
 
-class Ending(unittest.TestCase):
+class Ending(realtime.TestCase):
     def test_nothing_is_left_behind(self):
         for how in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             with emu.directory() as directory, emu.Emulator("mpc") as e:
@@ -167,7 +167,7 @@ class Ending(unittest.TestCase):
                 self.assertLess(position_mpc(port.ask(b"C", 14))[0], 100)
 
 
-class Telling(unittest.TestCase):
+class Telling(realtime.TestCase):
     def test_check(self):
         with emu.directory() as directory:
             status, out, err = guard.run("check", config_file(directory, rig(guard.TRIO, keepouts=guard.POST, margin=50)))
@@ -220,7 +220,7 @@ class Telling(unittest.TestCase):
                     self.assertIn(word, err)
 
 
-class Compiling(unittest.TestCase):
+class Compiling(realtime.TestCase):
     def test_a_binary_is_what_the_text_is(self):
         with emu.directory() as directory:
             conf, binary = config_file(directory, rig(guard.TRIO, keepouts=guard.POST)), directory + "/rig.bin"
@@ -255,7 +255,7 @@ class Compiling(unittest.TestCase):
             self.assertIn("needs a higher 'revision' than 1", err)
 
 
-class Killed(unittest.TestCase):
+class Killed(realtime.TestCase):
     """kill -9 in mid-move, of each, in every order of starting again: locked or disarmed, and nothing moves by itself."""
 
     def setUp(self):

@@ -17,7 +17,7 @@ target_link_libraries(consumer dryrig::dryrig)
 
 
 def sh(*args, **options):
-    done = subprocess.run(args, capture_output=True, text=True, timeout=300, **options)
+    done = subprocess.run(args, capture_output=True, text=True, timeout=1200, **options)
     if done.returncode != 0:
         raise AssertionError(f"{args}: {done.stdout}{done.stderr}")
     return done.stdout

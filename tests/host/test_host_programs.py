@@ -10,11 +10,13 @@ import tempfile
 import time
 import unittest
 
+import realtime
+
 DRYRIG = os.environ["DRYRIG"]
 EMULATOR = os.environ["DRYRIG_EMU"]
 EXAMPLES = os.environ["DRYRIG_EXAMPLES"]
 SHIM = os.environ["DRYRIG_SHIM"]
-LIMIT_S = 30  # that only a broken program reaches
+LIMIT_S = 60  # that only a broken program reaches
 
 
 def run(*args, env=None, program=DRYRIG):
@@ -75,7 +77,7 @@ class Rig:
         return self.json("position")[-1]["position"]["steps"]
 
 
-class Commands(unittest.TestCase):
+class Commands(realtime.TestCase):
     def test_every_command_of_the_mpc(self):
         with Rig("mpc", "MP-225", "--device", "MP-285", "--speedup", "50", "--work", "0,0,16000") as rig:
             info = rig.json("info")[-1]
@@ -202,7 +204,7 @@ class Usage(unittest.TestCase):
         self.assertTrue(all(len(line) <= 120 for line in out.splitlines() if not line.startswith("Stages")))
 
 
-class Starting(unittest.TestCase):
+class Starting(realtime.TestCase):
     def start(self, words, **options):
         process = subprocess.Popen(words, **options)
 
@@ -342,7 +344,7 @@ class Signals(Starting):
             self.assertTrue(seen.endswith(b"\r\x1b[K"))
 
 
-class Examples(unittest.TestCase):
+class Examples(realtime.TestCase):
     def run_example(self, name, *args):
         status, out, err = run(*args, program=f"{EXAMPLES}/example_{name}")
         self.assertEqual(0, status, err)

@@ -10,9 +10,11 @@ import sys
 import tempfile
 import unittest
 
+import realtime
+
 ROOT = os.environ["DRYRIG_ROOT"]
 EXAMPLE = os.path.join(ROOT, "docs", "ci-example")
-LIMIT_S = 100
+LIMIT_S = 300
 with open(os.path.join(ROOT, "docs", "ci.md"), encoding="utf-8") as text:
     PAGE = text.read()
 
@@ -50,7 +52,7 @@ def blocks(language, under=""):
     return found
 
 
-class Recipes(unittest.TestCase):
+class Recipes(realtime.TestCase):
     def setUp(self):
         context = tempfile.TemporaryDirectory()
         self.addCleanup(context.cleanup)

@@ -7,6 +7,7 @@ import sys
 import unittest
 
 import emu
+import realtime
 from ctl import Rehearsal, ctl
 
 DRYRIG = os.environ["DRYRIG"]

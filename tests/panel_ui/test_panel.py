@@ -288,6 +288,7 @@ class Keys(unittest.TestCase):
             t.shows("green")
             t.keys("w")
             t.shows("no work position is stored yet: W stores this place")
+            emu.wait_until(lambda: e.do("panel")["down"] == ["work"], "w presses WORK")
             e.do("advance until idle")
             t.shows("no work position is stored: nothing moves")  # in the log
             t.keys("S")
@@ -318,6 +319,7 @@ class Keys(unittest.TestCase):
             t.shows("DRIVE 1")
             t.keys("w")
             t.shows("no work position is stored yet: S stores this place")
+            emu.wait_until(lambda: e.do("panel")["down"] == ["work"], "w presses WORK POS.")
             e.do("advance until idle")
             t.keys("W")
             emu.wait_until(lambda: e.do("panel")["down"] == ["work"], "W holds WORK POS.")

@@ -9,6 +9,8 @@ import tempfile
 import time
 import unittest
 
+import realtime
+
 ROOT, BUILD, COMPILER, *FLAGS = sys.argv[1:]
 with open(os.path.join(ROOT, "README.md"), encoding="utf-8") as file:
     README = file.read()
@@ -20,7 +22,7 @@ def blocks(language):
     return found
 
 
-class Readme(unittest.TestCase):
+class Readme(realtime.TestCase):
     """Each test has emulators of its own at links of its own, in place of those that README.md names."""
 
     def setUp(self):
@@ -36,7 +38,7 @@ class Readme(unittest.TestCase):
     @staticmethod
     def stop(emulator):
         emulator.terminate()
-        emulator.communicate(timeout=20)
+        emulator.communicate(timeout=60)
 
     def path(self, name):
         return os.path.join(self.directory.name, name)
@@ -46,7 +48,7 @@ class Readme(unittest.TestCase):
         return re.sub(r"(?<![\w/])build/", f"{BUILD}/", text)
 
     def run_here(self, *command):
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=self.directory.name,
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=self.directory.name,
                               env={**os.environ, "PATH": f"{BUILD}/firmware/ports/posix:{os.environ['PATH']}"})
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         return done.stdout
@@ -65,7 +67,7 @@ class Readme(unittest.TestCase):
         self.addCleanup(self.stop, guard)
         self.assertRegex(guard.stdout.readline(), r"^ready /dev/pts/\d+\n$")
         self.run_here(f"{BUILD}/firmware/ports/posix/dryrig-guard", "ctl", self.path("rig.sock"), "status")
-        for _ in range(200):  # it proves first who the controller is
+        for _ in range(1200):  # it proves first who the controller is
             if '"needs":[{"need":"key"' in self.run_here(f"{BUILD}/firmware/ports/posix/dryrig-guard", "ctl", "--json",
                                                          self.path("rig.sock"), "status"):
                 break

@@ -74,7 +74,7 @@ class Run(emu.InDirectory):
     def test_quit_is_the_controllers_end_and_not_the_commands(self):
         """Otherwise a test suite that says `quit` when it is done would pass, whatever comes of it."""
         script = ('%s ctl "$DRYRIG_CONTROL" quit >/dev/null; while [ -e "$DRYRIG_PORT" ]; do sleep 0.01; done; '
-                  'trap "exit 6" TERM; echo gone; for i in $(seq 1000); do sleep 0.01; done')
+                  'trap "exit 6" TERM; echo gone; for i in $(seq 6000); do sleep 0.01; done')
         for options in (), ("--strict", "--clock", "jump"):
             process = subprocess.Popen([emu.PROGRAM, "run", *options, "mpc", "--", "sh", "-c", script % emu.PROGRAM],
                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=self.environment)
