@@ -68,51 +68,68 @@ static dr_diagonal direction(const dr_panel *p)
 
 /* -- Movement by hand ------------------------------------------------------------------------------------------------ */
 
-static void place(dr_panel *p, dr_us now, uint32_t x, uint32_t y, uint32_t z)
+/* How far the axis can go. */
+static uint32_t room_steps(const dr_panel *p, uint8_t axis, bool forward)
 {
-    const uint32_t *at = active_drive(p)->position_steps;
-    if (x != at[DR_X] || y != at[DR_Y] || z != at[DR_Z])
-        (void)dr_controller_poke(p->controller, now, &(dr_hand){DR_HAND_PLACE, p->controller->active, 0, {x, y, z}});
+    const uint32_t at_steps = active_drive(p)->position_steps[axis];
+    return forward ? active_stage(p).travel_steps[axis] - at_steps : at_steps;
+}
+
+static void move_by(dr_panel *p, dr_us now, bool forward, const uint32_t way_steps[DR_AXES])
+{
+    dr_hand hand = {DR_HAND_PLACE, p->controller->active, 0, {0, 0, 0}};
+    bool is_moved = false;
+    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
+        const uint32_t way = way_steps[axis];
+        hand.steps[axis] = active_drive(p)->position_steps[axis] + (forward ? way : 0u - way);
+        is_moved = is_moved || way != 0;
+    }
+    if (is_moved)
+        (void)dr_controller_poke(p->controller, now, &hand);
 }
 
 static void move_axis(dr_panel *p, dr_us now, uint8_t axis, bool forward, uint32_t steps)
 {
-    const dr_stage stage = active_stage(p);
-    uint32_t to[DR_AXES];
-    for (uint8_t i = 0; i < DR_AXES; i++)
-        to[i] = active_drive(p)->position_steps[i];
-    const uint32_t room = forward ? stage.travel_steps[axis] - to[axis] : to[axis];
-    const uint32_t way = steps < room ? steps : room;
-    to[axis] = forward ? to[axis] + way : to[axis] - way;
-    place(p, now, to[DR_X], to[DR_Y], to[DR_Z]);
+    const uint32_t room = room_steps(p, axis, forward);
+    uint32_t way[DR_AXES] = {0, 0, 0};
+    way[axis] = steps < room ? steps : room;
+    move_by(p, now, forward, way);
 }
 
-/* Where X or Z stands, in 1/32768 of a microstep from the lower edge of microstep 0. */
-static uint64_t exact(uint32_t steps, uint16_t part) { return (uint64_t)steps * UNIT + part; }
-
-/* How many steps along the diagonal until this axis would leave its travel; at most `steps`. */
-static uint32_t within(uint64_t at, uint32_t travel_steps, uint16_t share, bool forward, uint32_t steps)
+/* How many steps along the diagonal until this axis, which stands so far within a microstep, would leave its travel; at most
+ * `steps`. In 1/32768 of a microstep its room has more than 32 bits: it is divided in two pieces. */
+static uint32_t within(uint32_t room, uint16_t part, uint16_t share, bool forward, uint32_t steps)
 {
-    const uint64_t room = forward ? (uint64_t)(travel_steps + 1u) * UNIT - 1u - at : at;
-    return share > 0 && room / share < steps ? (uint32_t)(room / share) : steps;
+    if (share == 0)
+        return steps;
+    const uint32_t room_part = forward ? UNIT - 1u - part : part;
+    const uint32_t way = room / share * UNIT + (room % share * UNIT + room_part) / share;
+    return way < steps ? way : steps;
+}
+
+/* Goes this axis' share of a way along the diagonal. Returns the microsteps that it comes through. */
+static uint32_t go_on(uint16_t *part, uint16_t share, bool forward, uint32_t way)
+{
+    const uint32_t whole = way / UNIT * share, rest = way % UNIT * share;
+    const uint32_t begin =
+        forward ? *part : *part + share * UNIT; /* back, it is counted from `share` microsteps before */
+    const uint32_t reached = forward ? begin + rest : begin - rest;
+    *part = (uint16_t)(reached % UNIT);
+    return whole + (forward ? reached / UNIT : share - reached / UNIT);
 }
 
 /* Along the diagonal: X by cos, Z by sin, each to the microstep that the exact place is in. The fraction is kept, so that
  * many small turns go as straight and as far as one large one. Where an axis meets its end, both stop. */
 static void move_along(dr_panel *p, dr_us now, bool forward, uint32_t steps)
 {
-    const dr_stage stage = active_stage(p);
     const dr_diagonal along = direction(p);
-    const uint32_t *from = active_drive(p)->position_steps;
     uint16_t *part = active_panel(p)->part;
-    uint64_t x = exact(from[DR_X], part[0]), z = exact(from[DR_Z], part[1]);
-    uint64_t way = within(x, stage.travel_steps[DR_X], along.cos, forward, steps);
-    way = within(z, stage.travel_steps[DR_Z], along.sin, forward, (uint32_t)way);
-    x = forward ? x + way * along.cos : x - way * along.cos;
-    z = forward ? z + way * along.sin : z - way * along.sin;
-    part[0] = (uint16_t)(x % UNIT);
-    part[1] = (uint16_t)(z % UNIT);
-    place(p, now, (uint32_t)(x / UNIT), from[DR_Y], (uint32_t)(z / UNIT));
+    uint32_t way[DR_AXES] = {0, 0, 0};
+    steps = within(room_steps(p, DR_X, forward), part[0], along.cos, forward, steps);
+    steps = within(room_steps(p, DR_Z, forward), part[1], along.sin, forward, steps);
+    way[DR_X] = go_on(&part[0], along.cos, forward, steps);
+    way[DR_Z] = go_on(&part[1], along.sin, forward, steps);
+    move_by(p, now, forward, way);
 }
 
 /* 2.85 um along the diagonal, this axis' share of it to the nearest microstep [P]. */
@@ -129,22 +146,20 @@ static uint32_t fitting(uint32_t pulses, uint32_t room, uint32_t pulse)
 /* Whole pulses only; those for which an axis has no room are not made. */
 static void move_pulses(dr_panel *p, dr_us now, bool forward, uint32_t pulses)
 {
-    const dr_stage stage = active_stage(p);
     const dr_diagonal along = direction(p);
-    const uint32_t *at = active_drive(p)->position_steps;
-    const uint32_t x = pulse_steps(along.cos, stage.quanta_per_step), z = pulse_steps(along.sin, stage.quanta_per_step);
-    pulses = fitting(pulses, forward ? stage.travel_steps[DR_X] - at[DR_X] : at[DR_X], x);
-    pulses = fitting(pulses, forward ? stage.travel_steps[DR_Z] - at[DR_Z] : at[DR_Z], z);
-    if (forward)
-        place(p, now, at[DR_X] + pulses * x, at[DR_Y], at[DR_Z] + pulses * z);
-    else
-        place(p, now, at[DR_X] - pulses * x, at[DR_Y], at[DR_Z] - pulses * z);
+    const uint8_t q = active_stage(p).quanta_per_step;
+    uint32_t way[DR_AXES] = {pulse_steps(along.cos, q), 0, pulse_steps(along.sin, q)};
+    pulses = fitting(pulses, room_steps(p, DR_X, forward), way[DR_X]);
+    pulses = fitting(pulses, room_steps(p, DR_Z, forward), way[DR_Z]);
+    way[DR_X] *= pulses;
+    way[DR_Z] *= pulses;
+    move_by(p, now, forward, way);
 }
 
 /* -- Knobs ----------------------------------------------------------------------------------------------------------- */
 
 /* How often a step is doubled because the knob is turned fast. */
-static uint8_t doublings(dr_panel *p, dr_us now, dr_knob knob, uint32_t detents)
+static uint8_t doublings(dr_panel *p, dr_us now, dr_knob knob, uint16_t detents)
 {
     const bool goes_on = p->turned == knob;
     const dr_us each_us = (now - p->turned_at) / detents;
@@ -155,14 +170,14 @@ static uint8_t doublings(dr_panel *p, dr_us now, dr_knob knob, uint32_t detents)
     return each_us < DR_KNOB_FASTEST_US ? 3 : each_us < DR_KNOB_FASTER_US ? 2 : 1;
 }
 
-static uint32_t steps_per_detent(dr_panel *p, dr_us now, dr_knob knob, uint32_t detents)
+static uint16_t steps_per_detent(dr_panel *p, dr_us now, dr_knob knob, uint16_t detents)
 {
     const uint8_t mode = active_drive(p)->mode;
-    if (!is_trio(p))
-        return mode > 0 ? DR_KNOB_MPC_STEPS >> (mode - 1u)
-                        : DR_KNOB_MPC_MODE_0_STEPS << doublings(p, now, knob, detents);
-    const uint8_t doubled = SWITCH(p->inside_read, INSIDE_NON_LINEAR) ? doublings(p, now, knob, detents) : 0;
-    return (DR_KNOB_TRIO_STEPS >> 2u * p->speed) << doubled;
+    if (!is_trio(p) && mode > 0)
+        return (uint16_t)(DR_KNOB_MPC_STEPS >> (mode - 1u));
+    const unsigned slow = is_trio(p) ? DR_KNOB_TRIO_STEPS >> 2u * p->speed : DR_KNOB_MPC_MODE_0_STEPS;
+    const bool accelerates = !is_trio(p) || SWITCH(p->inside_read, INSIDE_NON_LINEAR);
+    return (uint16_t)(accelerates ? slow << doublings(p, now, knob, detents) : slow);
 }
 
 /* Does a turn clockwise go forward? TRIO external switches 1-4: ON is counter-clockwise [T table 1]; MPC-200 switches 5-7: ON
@@ -184,7 +199,7 @@ static void turn_angle(dr_panel *p, dr_us now, int16_t detents)
 }
 
 /* Steps through the drives that are connected. */
-static void turn_manipulator(dr_panel *p, dr_us now, bool up, uint32_t clicks)
+static void turn_manipulator(dr_panel *p, dr_us now, bool up, uint16_t clicks)
 {
     const dr_controller *c = p->controller;
     uint8_t connected[DR_PORTS] = {0}, count = 0, at = 0;
@@ -197,30 +212,30 @@ static void turn_manipulator(dr_panel *p, dr_us now, bool up, uint32_t clicks)
     if (count == 0)
         return;
     if (SWITCH(p->inside_read, ROE_NOT_CYCLICAL)) {
-        const uint32_t room = up ? count - 1u - at : at;
+        const uint8_t room = (uint8_t)(up ? count - 1u - at : at);
         clicks = clicks < room ? clicks : room;
     }
-    clicks %= count;
-    const uint8_t to = (uint8_t)((at + (up ? clicks : count - clicks)) % count);
+    const uint8_t way = (uint8_t)(clicks % count);
+    const uint8_t to = (uint8_t)((up ? at + way : at + count - way) % count);
     if (to != at)
         (void)apply(p, now, DR_EFFECT_SELECT, connected[to]);
 }
 
 /* Modes stop at both ends. */
-static void turn_mode(dr_panel *p, dr_us now, bool up, uint32_t clicks)
+static void turn_mode(dr_panel *p, dr_us now, bool up, uint16_t clicks)
 {
     const uint8_t mode = active_drive(p)->mode;
-    uint32_t to = up ? MODE_OF_TWO : 0;
+    uint8_t to = (uint8_t)(up ? MODE_OF_TWO : 0);
     if (SWITCH(p->inside_read, ROE_ALL_MODES)) {
-        const uint32_t room = up ? MODE_LAST - mode : mode;
-        const uint32_t way = clicks < room ? clicks : room;
-        to = up ? mode + way : mode - way;
+        const uint8_t room = (uint8_t)(up ? MODE_LAST - mode : mode);
+        const uint8_t way = (uint8_t)(clicks < room ? clicks : room);
+        to = (uint8_t)(up ? mode + way : mode - way);
     }
     if (to != mode)
-        (void)apply(p, now, DR_EFFECT_MODE, (uint8_t)to);
+        (void)apply(p, now, DR_EFFECT_MODE, to);
 }
 
-static void turn_stage(dr_panel *p, dr_us now, dr_knob knob, bool clockwise, uint32_t detents)
+static void turn_stage(dr_panel *p, dr_us now, dr_knob knob, bool clockwise, uint16_t detents)
 {
     const bool forward = clockwise == is_clockwise_forward(p, knob);
     const bool is_along = knob == DR_KNOB_D || (knob == DR_KNOB_Z && active_panel(p)->is_diagonal);
@@ -228,7 +243,7 @@ static void turn_stage(dr_panel *p, dr_us now, dr_knob knob, bool clockwise, uin
         move_pulses(p, now, forward, detents);
         return;
     }
-    const uint32_t steps = detents * steps_per_detent(p, now, knob, detents);
+    const uint32_t steps = (uint32_t)detents * steps_per_detent(p, now, knob, detents);
     if (is_along)
         move_along(p, now, forward, steps);
     else
@@ -238,7 +253,7 @@ static void turn_stage(dr_panel *p, dr_us now, dr_knob knob, bool clockwise, uin
 bool dr_panel_turn(dr_panel *p, dr_us now, dr_knob knob, int16_t detents)
 {
     const bool clockwise = detents > 0;
-    const uint32_t count = (uint32_t)(clockwise ? (int32_t)detents : -(int32_t)detents);
+    const uint16_t count = (uint16_t)(clockwise ? (int32_t)detents : -(int32_t)detents);
     dr_panel_settle(p, now);
     if (knob >= DR_KNOBS || (is_trio(p) ? knob > DR_KNOB_D : knob == DR_KNOB_D))
         return false;

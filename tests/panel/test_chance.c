@@ -172,10 +172,51 @@ static void live_twice(dr_kind kind)
 static void a_trio_lives_the_same_however_often_it_is_visited(void) { live_twice(DR_TRIO); }
 static void an_mpc_lives_the_same_however_often_it_is_visited(void) { live_twice(DR_MPC); }
 
+/* In whole numbers of 64 bits: the exact place in 1/32768 of a microstep, X by cos and Z by sin; where one of them would leave
+ * its travel, both stand [P]. */
+static int64_t farthest(int64_t at, int64_t share, bool forward, uint32_t travel_steps, int64_t steps)
+{
+    const int64_t room = forward ? ((int64_t)travel_steps + 1) * 32768 - 1 - at : at;
+    return share > 0 && room / share < steps ? room / share : steps;
+}
+
+static void any_turn_along_any_angle_is_exact(void)
+{
+    seed = 1;
+    for (unsigned deg = 0; deg <= 90; deg++) {
+        const dr_diagonal along = dr_angle_get((uint8_t)deg);
+        bench_set_up(DR_TRIO);
+        dr_drive_init(&b.drives[0], DR_STAGE_TRIO_MP865);
+        b.c.angle_deg = (uint8_t)deg;
+        bench_start();
+        dr_stage stage;
+        TEST_ASSERT_TRUE(dr_stage_get(DR_STAGE_TRIO_MP865, &stage));
+        int64_t x = (int64_t)b.drives[0].position_steps[DR_X] * 32768 + 16384;
+        int64_t z = (int64_t)b.drives[0].position_steps[DR_Z] * 32768 + 16384;
+        for (unsigned turn = 0, speed = 0; turn < 100; turn++) {
+            static const uint32_t detents[] = {2, 20, 2000, 30001};
+            const bool forward = chance(2) == 0;
+            const uint32_t count = chance(detents[chance(4)]);
+            const int64_t steps = (int64_t)count * (64 >> 2 * speed);
+            int64_t way = farthest(x, along.cos, forward, stage.travel_steps[DR_X], steps);
+            way = farthest(z, along.sin, forward, stage.travel_steps[DR_Z], way);
+            x += (forward ? way : -way) * along.cos;
+            z += (forward ? way : -way) * along.sin;
+            bench_turn(DR_KNOB_D, forward ? (int)count : -(int)count);
+            bench_expect_at((uint32_t)(x / 32768), b.drives[0].position_steps[DR_Y], (uint32_t)(z / 32768));
+            if (chance(10) == 0) {
+                bench_tap(DR_BUTTON_SPEED);
+                speed = (speed + 1) % 4;
+            }
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN(a_trio_lives_the_same_however_often_it_is_visited);
     RUN(an_mpc_lives_the_same_however_often_it_is_visited);
+    RUN(any_turn_along_any_angle_is_exact);
     return UNITY_END();
 }
