@@ -122,10 +122,10 @@ bool values_time_us(const char *text, uint64_t *us, char why[WHY_ROOM])
     for (size_t i = 0; unit != NULL && i < sizeof units / sizeof units[0]; i++) {
         if (strcmp(unit, units[i].name) != 0)
             continue;
-        if (millionths / MICRO > TIME_MAX_S * MICRO / units[i].us ||
-            millionths / MICRO * units[i].us > TIME_MAX_S * MICRO)
+        const uint64_t whole = millionths / MICRO, part_us = millionths % MICRO * units[i].us / MICRO;
+        if (whole > TIME_MAX_S * MICRO / units[i].us || whole * units[i].us + part_us > TIME_MAX_S * MICRO)
             break;
-        *us = millionths / MICRO * units[i].us + millionths % MICRO * units[i].us / MICRO;
+        *us = whole * units[i].us + part_us;
         return true;
     }
     (void)snprintf(why, WHY_ROOM, "expected a time with its unit: 80us, 250ms, 1.5s, 3min or 2h; 1000h at most");

@@ -29,7 +29,8 @@ static const control_name buttons[] = {{"home", TRIO | MPC, DR_BUTTON_HOME},  {"
                                        {"diagonal", MPC, DR_BUTTON_DIAGONAL}, {"calibrate", MPC, DR_BUTTON_CALIBRATE},
                                        {"angle", TRIO, DR_BUTTON_PULSE}, /* as the same buttons are also labelled */
                                        {"lock", TRIO, DR_BUTTON_SPEED},       {"set", MPC, DR_BUTTON_STOP},
-                                       {"center", MPC, DR_BUTTON_CALIBRATE},  {NULL, 0, 0}};
+                                       {"center", MPC, DR_BUTTON_CALIBRATE},  {"norm", MPC, DR_BUTTON_DIAGONAL},
+                                       {"diag", MPC, DR_BUTTON_DIAGONAL},     {NULL, 0, 0}};
 static const control_name knobs[] = {{"x", TRIO | MPC, DR_KNOB_X},
                                      {"y", TRIO | MPC, DR_KNOB_Y},
                                      {"z", TRIO | MPC, DR_KNOB_Z},
@@ -106,7 +107,7 @@ static bool hold_down(telling *t, int button, const char *name, uint64_t span_us
 {
     instrument *const ins = ins_of(t);
     if ((ins->panel.down & BIT(button)) != 0)
-        return telling_wrong(t, "'%s' is down already", name);
+        return telling_wrong(t, "'%s' is down already; 'release %s' lets it go", name, name);
     pressed *const it = calloc(1, sizeof *it);
     if (it == NULL)
         return telling_wrong(t, "no memory");
@@ -130,6 +131,22 @@ static bool do_hold(telling *t)
     uint64_t span_us;
     return read_control(t, buttons, &button, &name) && telling_time(t, &span_us) && telling_ends(t) &&
            hold_down(t, button, name, span_us);
+}
+
+/* Before it goes up by itself. */
+static bool do_release(telling *t)
+{
+    int button = 0;
+    const char *name = "";
+    if (!read_control(t, buttons, &button, &name) || !telling_ends(t))
+        return false;
+    for (planned *p = t->l->e->plans; p != NULL; p = p->next)
+        if (p->strike == let_go && ((pressed *)p)->s == t->s && ((pressed *)p)->button == (dr_button)button) {
+            engine_unplan(t->l->e, p);
+            let_go(p);
+            return true;
+        }
+    return telling_wrong(t, "'%s' is not down", name);
 }
 
 static bool do_knob(telling *t)
@@ -160,10 +177,19 @@ static unsigned switches_in(const telling *t, int bank)
     case DR_SWITCHES_REAR:
         return kind_of(t) == DR_TRIO ? 6 : 8;
     case DR_SWITCHES_RIGHT:
-        return 1;
+        return 2;
     default:
         return 4;
     }
+}
+
+/* Whose switch it is: RIGHT TRAN 1 and 2 of an MPC-200 are those of its devices A and B [M table 4], 1 of each (dr_panel.h). */
+static void find_switch(int bank, uint8_t *drive, uint8_t *number)
+{
+    if (bank != DR_SWITCHES_RIGHT)
+        return;
+    *drive = (uint8_t)(*drive / 2u * 2u + *number - 1u);
+    *number = 1;
 }
 
 static bool do_switch(telling *t)
@@ -182,9 +208,10 @@ static bool do_switch(telling *t)
     const bool on = telling_take(t, "on");
     if (!on && !telling_take(t, "off"))
         return telling_wrong(t, "expected on or off behind the number");
-    return telling_ends(t) &&
-           (dr_panel_switch(&ins->panel, (dr_switches)bank, (uint8_t)(device - 1u), (uint8_t)number, on) ||
-            telling_wrong(t, "internal switch 2 follows the device that is connected"));
+    uint8_t drive = (uint8_t)(device - 1u), found = (uint8_t)number;
+    find_switch(bank, &drive, &found);
+    return telling_ends(t) && (dr_panel_switch(&ins->panel, (dr_switches)bank, drive, found, on) ||
+                               telling_wrong(t, "internal switch 2 follows the device that is connected"));
 }
 
 /* -- What a person sees -------------------------------------------------------------------------------------------------- */
@@ -255,10 +282,12 @@ static void add_switches(const telling *t, cJSON *out)
         if ((n->kinds & BIT(kind_of(t))) == 0)
             continue;
         cJSON *const list = cJSON_AddArrayToObject(out, n->name);
-        for (unsigned number = 1; number <= switches_in(t, n->control); number++)
-            (void)cJSON_AddItemToArray(
-                list, cJSON_CreateBool(dr_panel_switch_is_on(&ins->panel, (dr_switches)n->control,
-                                                             ins->controller.active, (uint8_t)number)));
+        for (uint8_t i = 1; i <= switches_in(t, n->control); i++) {
+            uint8_t drive = ins->controller.active, number = i;
+            find_switch(n->control, &drive, &number);
+            const bool is_on = dr_panel_switch_is_on(&ins->panel, (dr_switches)n->control, drive, number);
+            (void)cJSON_AddItemToArray(list, cJSON_CreateBool(is_on));
+        }
     }
 }
 
@@ -312,6 +341,7 @@ static bool do_panel(telling *t)
 const verb verbs_hands[] = {
     {"press", "BUTTON", "press a button for 100 ms", true, do_press},
     {"hold", "BUTTON TIME", "hold a button down for TIME", true, do_hold},
+    {"release", "BUTTON", "let a button go that is down", true, do_release},
     {"knob", "x|y|z|d|manipulator|mode [+|-]N", "turn a knob, or a selector, N detents; + is clockwise", true, do_knob},
     {"switch", "rear|internal|roe|right [device N] NUMBER on|off",
      "a DIP switch, as numbered on the box; the controller looks at it when it is switched on", true, do_switch},

@@ -396,12 +396,13 @@ class Roe200(Controls):
         self.assertEqual(self.ask(b"H", 1), b"\r")
         self.assertEqual(self.at(), [0, 1536, 0])
 
-    # [M table 4] RIGHT TRAN, one for each device; table 1, switch 4: reserved.
+    # [M table 4] RIGHT TRAN: switch 1 manipulator A, switch 2 manipulator B; table 1, switch 4: reserved.
     def test_right_angle_and_reserved_switches(self):
         self.begin()
-        self.do("switch right 1 on", "switch right device 2 1 on", "switch roe 4 off", "power cycle")
+        self.assertEqual(self.e.do("panel")["switches"]["right"], [False, False])  # not installed: normal operation
+        self.do("switch right 2 on", "switch roe 4 off", "power cycle")
         switches, = self.panel("switches")
-        self.assertEqual((switches["right"], switches["roe"][3]), ([True], False))
+        self.assertEqual((switches["right"], switches["roe"][3]), ([False, True], False))
         self.assertEqual(self.moved_by("knob x 1", "knob y 1", "knob z 1"), [64, 64, 64])
 
 

@@ -91,9 +91,43 @@ class Buttons(unittest.TestCase):
             e.do("advance 1s")
             self.assertEqual(e.controller()["devices"][0]["work_steps"], [100, 200, 300])
 
+    def test_a_button_is_let_go_before_its_time(self):
+        with trio() as e:
+            e.do("hold home 1000h")
+            e.do("advance 2s")
+            self.assertIn("'release home' lets it go", e.refuses("press home"))
+            e.do("release home")  # before 3 s: a press
+            self.assertEqual((e.do("panel")["down"], e.controller()["move"]), ([], "home"))
+            self.assertIn("'home' is not down", e.refuses("release home"))
+            e.do("advance until idle")
+            self.assertEqual(e.position(), [0, 0, 0])
+            e.do("hold work 1000h")
+            e.do("hold speed 1000h")
+            e.do("advance 3s")
+            e.do("release work")
+            self.assertEqual(e.do("panel")["down"], ["speed"])  # each by itself
+            e.do("release lock")
+            panel = e.do("panel")
+            self.assertEqual((panel["down"], panel["locked"], panel["beeps"]), ([], True, 2))
+            e.do("hold lock 1s")
+            e.do("in 999999us release speed")  # and its own end finds nothing any more
+            e.do("advance 2s")
+            self.assertEqual((e.do("panel")["speed"], e.do("panel")["down"]), (1, []))
+            e.do("press pulse")  # may be down when the emulator ends
+
+    def test_how_long_a_button_can_be_held(self):
+        with trio() as e:
+            for span in "1000h", "3600000s", "60000min", "1us":
+                e.do("hold home " + span)
+                e.do("release home")
+                e.do("advance until idle")
+            for span in "1001h", "3600001s", "1000.5h":
+                self.assertIn("1000h at most", e.refuses("hold home " + span))
+            self.assertEqual(e.do("panel")["down"], [])
+
     def test_every_button_has_its_names(self):
         for start, names in ((trio, "home work pulse angle relative speed lock"),
-                             (mpc, "home work stop set diagonal calibrate center")):
+                             (mpc, "home work stop set diagonal norm diag calibrate center")):
             with start() as e:
                 for name in names.split():
                     e.do("press " + name)
@@ -108,6 +142,9 @@ class Buttons(unittest.TestCase):
             e.do("press home")
             self.assertIn("down already", e.refuses("press home"))
             self.assertIn("down already", e.refuses("hold home 3s"))
+            self.assertIn("'work' is not down", e.refuses("release work"))
+            self.assertIn("expected one of home, work, pulse", e.refuses("release stop"))
+            self.assertIn("one word too many", e.refuses("release home now"))
             self.assertIn("expected one of x, y, z, d", e.refuses("knob q 1"))
             self.assertIn("whole number", e.refuses("knob x"))
             self.assertIn("whole number", e.refuses("knob x 1.5"))
@@ -186,19 +223,32 @@ class Switches(unittest.TestCase):
         with mpc() as e:
             e.do("switch rear 5 off")
             e.do("switch rear device 2 6 off")
-            e.do("switch right device 2 1 on")
+            e.do("switch right 2 on")  # device B of the MPC-200 that the active one is at
+            e.do("switch right device 3 1 on")  # device A of the second
             e.do("switch roe 1 off")
             self.assertEqual(e.do("panel")["switches"],
                              {"rear": [False, True, False, True, False, True, True, True],
-                              "roe": [False, True, False, True], "right": [False]})
+                              "roe": [False, True, False, True], "right": [False, True]})
             e.do("power cycle")
             e.do("knob x 1")
             e.do("knob mode 1")
             self.assertEqual(e.do("panel")["mode"], 5)
             e.do("knob manipulator +1")
             self.assertEqual(e.do("panel")["switches"]["rear"], [False, True, False, True, True, False, True, True])
-            self.assertEqual(e.do("panel")["switches"]["right"], [True])
+            self.assertEqual(e.do("panel")["switches"]["right"], [False, True])  # it is at the same one
             self.assertIn("from 1 to 4", e.refuses("switch rear device 5 1 on"))
+            self.assertIn("from 1 to 2", e.refuses("switch right 3 on"))
+
+    def test_devices_3_and_4_are_at_the_second_mpc_200(self):
+        with mpc("--device", "none", "--device", "none", "--device", "MP-225", "--device", "MP-225") as e:
+            e.do("switch right device 1 2 on")
+            e.do("switch right 1 on")
+            self.assertEqual(e.do("panel")["switches"]["right"], [True, False])
+            e.do("device 3 unplug")
+            e.do("device 4 unplug")
+            e.do("device 1 plug MP-225")
+            e.do("power cycle")
+            self.assertEqual(e.do("panel")["switches"]["right"], [False, True])
 
     def test_the_diagonal_that_is_set_outlives_a_power_cycle(self):
         with mpc() as e:
