@@ -299,41 +299,116 @@ static uint64_t us_between(uint64_t from_ns, uint64_t to_ns)
     return to_ns > from_ns ? (to_ns - from_ns) / NS_PER_US : 0;
 }
 
-/* Whether it was the host's turn. Real time: the host knows no other. */
-static void judge_turn(lint *l, const lint_station *s, const observation *seen, const dr_command *command,
-                       const uint8_t *bytes, size_t count, bool was_owed)
+static bool follows_position(const lint_station *s)
+{
+    return s->last == DR_OP_TRIO_POSITION || s->last == DR_OP_MPC_POSITION;
+}
+
+/* What the answer to a position still has on the line, where nothing else is; else nothing. */
+static uint32_t to_come(const lint_station *s)
+{
+    const dr_controller *const c = &s->ins->controller;
+    return follows_position(s) && s->in_flight == 0 && !is_moving_for_host(c) && c->kept_bytes == 0
+               ? (uint32_t)dr_controller_ready(c)
+               : 0;
+}
+
+static void was_counted(const lint *l, lint_station *s, uint32_t unread)
+{
+    s->left = (lint_left){.is_known = true, .bytes = unread, .first = l->finding_count};
+}
+
+/* So many bytes are unread now: is it what a program leaves that reads 13 bytes of each position? Then that is what has been
+ * found since it could last be counted. */
+static bool leaves_one_of_each(lint *l, lint_station *s, uint32_t unread)
+{
+    const lint_left *const left = &s->left;
+    const unsigned last = follows_position(s) ? 1 : 0;
+    if (!left->is_known)
+        return last == 1 && unread == 1;
+    if (left->positions + last == 0 || unread != left->bytes + last)
+        return false;
+    for (unsigned i = left->first; i < l->finding_count; i++)
+        if (&l->stations[l->findings[i].station] == s && l->findings[i].rule == LINT_UNREAD_REPLY)
+            l->findings[i].rule = LINT_THIRTEEN_BYTES;
+    l->counts[LINT_UNREAD_REPLY] -= left->supposed;
+    l->counts[LINT_THIRTEEN_BYTES] += left->supposed;
+    return true;
+}
+
+/* What had been left was read before it could be counted. */
+static void suppose_one_of_each(lint_station *s)
+{
+    const unsigned last = follows_position(s) ? 1 : 0;
+    s->left.bytes += last;
+    s->left.positions += last;
+    s->left.supposed++;
+    s->left.is_known = s->left.is_known && s->left.bytes > 0; /* else it is none of a position */
+}
+
+/* A command that came while the host was owed an answer. */
+static void judge_early(lint *l, lint_station *s, const observation *seen, const dr_command *command,
+                        const uint8_t *bytes, size_t count)
 {
     const dr_controller *const c = &s->ins->controller;
     const char *const before = dr_words_command(s->last)->name;
-    if (s->is_excused || s->stopped_late || s->command_ns == 0)
-        return;
     const uint64_t waited_us = us_between(s->command_ns, s->began_ns);
-    const bool follows_position = s->last == DR_OP_TRIO_POSITION || s->last == DR_OP_MPC_POSITION;
-    if (was_owed) {
-        if (follows_position && s->in_flight == 0 && !is_moving_for_host(c) && c->kept_bytes == 0 &&
-            dr_controller_ready(c) + s->unread == 1) /* a slow line: the 14th is still on its way */
-            find(l, s, seen, LINT_THIRTEEN_BYTES, bytes, count, "1 byte of the position was still to come");
-        else if ((command->is & DR_IS_QUERY) != 0 && is_moving_for_host(c) && s->in_flight == 0)
-            find(l, s, seen, LINT_QUERY_IN_MOVE, bytes, count, "during %s", dr_words_command((dr_op)c->move_op)->name);
-        else if (waited_us >= LINT_GAVE_UP_US)
-            find(l, s, seen, LINT_SHORT_TIME_LIMIT, bytes, count, "%llu ms after %s, whose CR had not come",
-                 (unsigned long long)waited_us / 1000u, before);
-        else
-            find(l, s, seen, LINT_EARLY_COMMAND, bytes, count, "%s was not yet answered", before);
+    const uint32_t coming = to_come(s);
+    if (coming > 0 && leaves_one_of_each(l, s, s->unread + coming)) { /* a slow line: the 14th is still on its way */
+        find(l, s, seen, LINT_THIRTEEN_BYTES, bytes, count, "%lu byte%s of the position %s still to come",
+             (unsigned long)coming, coming == 1 ? "" : "s", coming == 1 ? "was" : "were");
+        was_counted(l, s, s->unread + coming);
         return;
     }
-    if (s->unread == 1 && follows_position)
-        find(l, s, seen, LINT_THIRTEEN_BYTES, bytes, count, "1 byte of the position was still unread");
-    else if (s->unread > 0)
-        find(l, s, seen, LINT_UNREAD_REPLY, bytes, count, "%lu byte%s unread, the last answer was that to %s",
-             (unsigned long)s->unread, s->unread == 1 ? " was" : "s were", before);
-    else if (s->read_behind)
+    s->left.is_known = false;
+    if ((command->is & DR_IS_QUERY) != 0 && is_moving_for_host(c) && s->in_flight == 0)
+        find(l, s, seen, LINT_QUERY_IN_MOVE, bytes, count, "during %s", dr_words_command((dr_op)c->move_op)->name);
+    else if (waited_us >= LINT_GAVE_UP_US)
+        find(l, s, seen, LINT_SHORT_TIME_LIMIT, bytes, count, "%llu ms after %s, whose CR had not come",
+             (unsigned long long)waited_us / 1000u, before);
+    else
+        find(l, s, seen, LINT_EARLY_COMMAND, bytes, count, "%s was not yet answered", before);
+}
+
+static void judge_left(lint *l, lint_station *s, const observation *seen, const uint8_t *bytes, size_t count)
+{
+    const char *const before = dr_words_command(s->last)->name;
+    const unsigned long unread = s->unread;
+    if (unread == 0 && s->read_behind) {
         find(l, s, seen, LINT_UNREAD_REPLY, bytes, count, "the last of the answer to %s was read behind this", before);
+        suppose_one_of_each(s);
+        return;
+    }
+    if (unread == 1 && leaves_one_of_each(l, s, 1))
+        find(l, s, seen, LINT_THIRTEEN_BYTES, bytes, count, "1 byte of the position was still unread");
+    else if (unread > 1 && leaves_one_of_each(l, s, s->unread))
+        find(l, s, seen, LINT_THIRTEEN_BYTES, bytes, count, "%lu bytes were unread, 1 of each position", unread);
+    else if (unread > 0)
+        find(l, s, seen, LINT_UNREAD_REPLY, bytes, count, "%lu byte%s unread, the last answer was that to %s", unread,
+             unread == 1 ? " was" : "s were", before);
+    was_counted(l, s, s->unread);
+}
+
+/* Whether it was the host's turn. Real time: the host knows no other. */
+static void judge_turn(lint *l, lint_station *s, const observation *seen, const dr_command *command,
+                       const uint8_t *bytes, size_t count, bool was_owed)
+{
+    if (s->is_excused || s->stopped_late || s->command_ns == 0) {
+        was_counted(l, s, s->unread);
+        s->left.is_known = s->command_ns == 0; /* who has just opened the port finds nothing of before */
+        return;
+    }
+    if (was_owed) {
+        judge_early(l, s, seen, command, bytes, count);
+        return;
+    }
+    judge_left(l, s, seen, bytes, count);
     const uint64_t pause_us = us_between(s->reply_ns > s->command_ns ? s->reply_ns : s->command_ns, s->began_ns);
     if (pause_us + s->late_us < LINT_PAUSE_US && s->unread == 0 &&
         !s->read_behind) /* one that did not read has no pause to make */
         find(l, s, seen, LINT_HURRIED_COMMAND, bytes, count, "%llu.%llu ms after the answer to %s",
-             (unsigned long long)pause_us / 1000u, (unsigned long long)pause_us / 100u % 10u, before);
+             (unsigned long long)pause_us / 1000u, (unsigned long long)pause_us / 100u % 10u,
+             dr_words_command(s->last)->name);
 }
 
 static bool moves(const lint_station *s, dr_op op)
@@ -364,7 +439,9 @@ static void command_written(lint *l, lint_station *s, const observation *seen, c
     const bool was_owed = is_owed(s);
     const bool is_interrupt = (command->is & DR_IS_INTERRUPT) != 0;
     look_for_late_stop(l, s, is_interrupt, was_owed);
-    if (!is_interrupt) {
+    if (is_interrupt) {
+        s->left.is_known = false;
+    } else {
         judge_turn(l, s, seen, command, bytes, count, was_owed);
         judge_contents(l, s, seen, command, bytes, count, was_owed);
     }
@@ -493,8 +570,12 @@ static void port_left(lint *l, lint_station *s, const observation *seen)
         l->late_stops++;
     if (!has_spoken || s->is_excused || stopped_late || is_deaf(&s->ins->controller))
         return;
-    if (seen->unread == 1 && (s->last == DR_OP_TRIO_POSITION || s->last == DR_OP_MPC_POSITION))
+    const uint32_t left = seen->unread + to_come(s);
+    if (left == 1 && leaves_one_of_each(l, s, left))
         find(l, s, seen, LINT_THIRTEEN_BYTES, NULL, 0, "the port was closed with 1 byte of the position unread");
+    else if (left > 1 && leaves_one_of_each(l, s, left))
+        find(l, s, seen, LINT_THIRTEEN_BYTES, NULL, 0, "the port was closed with %lu bytes unread, 1 of each position",
+             (unsigned long)left);
     else if (seen->unread > 0)
         find(l, s, seen, LINT_UNREAD_REPLY, NULL, 0, "the port was closed with %lu byte%s unread, after %s",
              (unsigned long)seen->unread, seen->unread == 1 ? "" : "s", before);

@@ -60,18 +60,30 @@ typedef struct {
     char text[LINT_TEXT]; /* what makes this one a breach, in numbers */
 } lint_finding;
 
+/* What a host has left unread of older answers, as of its last command. Where it was so quick that this had been read before it
+ * could be counted, it is supposed to read 13 bytes of each position and everything else to the end: the next time that there
+ * is something to be counted tells whether that was so. */
+typedef struct {
+    bool is_known; /* counted, or supposed */
+    uint32_t bytes;
+    unsigned supposed;  /* findings since it was counted */
+    unsigned first;     /* the first of them, if it is kept */
+    unsigned positions; /* among the commands since then */
+} lint_left;
+
 /* What it knows of one station. */
 typedef struct {
     const instrument *ins;
     char name[64];
     dr_kind kind;
     uint16_t firmware;
-    dr_framer framer;    /* the host's bytes as written */
-    uint64_t began_ns;   /* the command in the framer: when its first byte was written */
-    uint32_t late_us;    /* what may be missing of the pauses within it and before it: the emulator was late */
-    uint32_t pause_us;   /* within it */
-    uint32_t unread;     /* when it began */
-    bool read_behind;    /* something that should have been read before it */
+    dr_framer framer;  /* the host's bytes as written */
+    uint64_t began_ns; /* the command in the framer: when its first byte was written */
+    uint32_t late_us;  /* what may be missing of the pauses within it and before it: the emulator was late */
+    uint32_t pause_us; /* within it */
+    uint32_t unread;   /* when it began */
+    bool read_behind;  /* something that should have been read before it */
+    lint_left left;
     uint64_t command_ns; /* the last whole command; 0: none yet */
     uint64_t reply_ns;   /* the end of the last reply; 0: none since the last command */
     dr_op last;          /* the last command */

@@ -676,6 +676,111 @@ static void a_program_that_reads_13_bytes_of_14_is_named(void)
     found(LINT_THIRTEEN_BYTES, 1);
 }
 
+/* The host asks, so quick that by the time one looks it has read what it had left of older answers, and reads so many bytes in
+ * all. Returns how many it leaves. */
+static uint32_t ask_quickly(const char *code, uint32_t left, uint32_t count)
+{
+    bench_wait_us(&b, 3000);
+    bench_read(&b, ALL);
+    b.has_read_behind = left > 0;
+    bench_say(&b, code, 1);
+    left += b.unread - count;
+    bench_read(&b, b.unread - left);
+    return left;
+}
+
+static void a_program_that_reads_13_bytes_again_and_again_is_named_each_time(void)
+{
+    start(DR_MPC);
+    for (unsigned i = 0; i < 4; i++) {
+        bench_wait_us(&b, 3000);
+        bench_say(&b, "C", 1);
+        bench_read(&b, 13);
+    }
+    bench_tell(&b, OBSERVED_CLOSED);
+    found(LINT_THIRTEEN_BYTES, 4);
+    TEST_ASSERT_EQUAL_STRING("1 byte of the position was still unread", l.findings[0].text);
+    TEST_ASSERT_EQUAL_STRING("3 bytes were unread, 1 of each position", l.findings[2].text);
+    TEST_ASSERT_EQUAL_STRING("the port was closed with 4 bytes unread, 1 of each position", l.findings[3].text);
+}
+
+static void a_quick_program_that_reads_13_bytes_is_named_when_it_leaves(void)
+{
+    uint32_t left = 0;
+    start(DR_MPC);
+    for (unsigned i = 0; i < 4; i++)
+        left = ask_quickly("C", left, 13);
+    found(LINT_UNREAD_REPLY, 3); /* nobody knows how much it was */
+    TEST_ASSERT_EQUAL(4, b.unread);
+    bench_tell(&b, OBSERVED_CLOSED);
+    found(LINT_THIRTEEN_BYTES, 4);
+}
+
+static void a_quick_program_that_reads_13_bytes_is_named_when_it_is_slow_once(void)
+{
+    uint32_t left = 0;
+    start(DR_MPC);
+    for (unsigned i = 0; i < 3; i++) {
+        left = ask_quickly("C", left, 13);
+        left = ask_quickly("K", left, 4);
+        left = ask_quickly("U", left, 6);
+    }
+    TEST_ASSERT_EQUAL(3, left);
+    bench_wait_us(&b, 3000);
+    bench_say(&b, "K", 1);
+    found(LINT_THIRTEEN_BYTES, 9);
+    TEST_ASSERT_EQUAL_STRING("3 bytes were unread, 1 of each position", l.findings[8].text);
+}
+
+static void a_quick_program_that_leaves_something_else_is_not_said_to_read_13_bytes(void)
+{
+    uint32_t left = 0;
+    start(DR_MPC);
+    for (unsigned i = 0; i < 3; i++)
+        left = ask_quickly("C", left, 12);
+    bench_tell(&b, OBSERVED_CLOSED);
+    found(LINT_UNREAD_REPLY, 3);
+}
+
+static void a_cr_that_a_quick_program_leaves_is_none_of_a_position(void)
+{
+    uint32_t left;
+    start(DR_MPC);
+    left = ask_quickly("F", 0, 0);
+    left = ask_quickly("C", left, 14);
+    left = ask_quickly("K", left, 4);
+    bench_tell(&b, OBSERVED_CLOSED);
+    found(LINT_UNREAD_REPLY, 3);
+    TEST_ASSERT_EQUAL(1, left);
+}
+
+static void a_cr_that_is_left_before_a_position_is_none_of_it(void)
+{
+    start(DR_MPC);
+    bench_say(&b, "F", 1);
+    bench_wait_us(&b, 3000);
+    bench_say(&b, "C", 1);
+    bench_read(&b, 14);
+    bench_wait_us(&b, 3000);
+    bench_say(&b, "K", 1);
+    found(LINT_UNREAD_REPLY, 2);
+}
+
+static void who_clears_the_buffer_leaves_nothing_to_be_counted(void)
+{
+    uint32_t left;
+    start(DR_MPC);
+    left = ask_quickly("C", 0, 13);
+    left = ask_quickly("C", left, 13);
+    bench_read(&b, ALL);
+    ask_quickly("C", 0, 13);
+    bench_tell(&b, OBSERVED_CLOSED);
+    TEST_ASSERT_EQUAL(2, left);
+    TEST_ASSERT_EQUAL(1, l.counts[LINT_UNREAD_REPLY]);
+    TEST_ASSERT_EQUAL(1, l.counts[LINT_THIRTEEN_BYTES]);
+    TEST_ASSERT_EQUAL(LINT_UNREAD_REPLY, l.findings[0].rule);
+}
+
 /* Byte 13 has left 174 + 2,257 us after the question, byte 14 leaves at 174 + 2,431 us [T table 3]. */
 static void a_program_that_goes_on_when_the_13th_byte_is_there_is_named(void)
 {
@@ -689,6 +794,24 @@ static void a_program_that_goes_on_when_the_13th_byte_is_there_is_named(void)
     bench_read(&b, ALL);
     bench_say(&b, "h", 1);
     found(LINT_THIRTEEN_BYTES, 1);
+}
+
+/* It has 1 byte of the first answer and 12 of the second, and two are on the line when it leaves. */
+static void a_program_that_leaves_while_the_rest_is_on_the_line_is_named(void)
+{
+    start(DR_TRIO);
+    b.ins.is_paced = true;
+    instrument_start(&b.ins, 0);
+    bench_say(&b, "c", 1);
+    bench_wait_us(&b, 10000);
+    bench_read(&b, 13);
+    bench_say(&b, "c", 1);
+    bench_wait_us(&b, 174 + 2084);
+    TEST_ASSERT_EQUAL(1 + 12, b.unread);
+    bench_read(&b, 13);
+    bench_tell(&b, OBSERVED_CLOSED);
+    found(LINT_THIRTEEN_BYTES, 2);
+    TEST_ASSERT_EQUAL_STRING("the port was closed with 2 bytes unread, 1 of each position", l.findings[1].text);
 }
 
 static void a_program_that_goes_on_when_the_12th_byte_is_there_is_early(void)
@@ -917,6 +1040,14 @@ int main(void)
     RUN_TEST(another_baud_rate_is_wrong);
     RUN_TEST(the_controllers_baud_rates_are_right);
     RUN_TEST(a_program_that_reads_13_bytes_of_14_is_named);
+    RUN_TEST(a_program_that_leaves_while_the_rest_is_on_the_line_is_named);
+    RUN_TEST(a_program_that_reads_13_bytes_again_and_again_is_named_each_time);
+    RUN_TEST(a_quick_program_that_reads_13_bytes_is_named_when_it_leaves);
+    RUN_TEST(a_quick_program_that_reads_13_bytes_is_named_when_it_is_slow_once);
+    RUN_TEST(a_quick_program_that_leaves_something_else_is_not_said_to_read_13_bytes);
+    RUN_TEST(a_cr_that_a_quick_program_leaves_is_none_of_a_position);
+    RUN_TEST(a_cr_that_is_left_before_a_position_is_none_of_it);
+    RUN_TEST(who_clears_the_buffer_leaves_nothing_to_be_counted);
     RUN_TEST(a_program_that_goes_on_when_the_13th_byte_is_there_is_named);
     RUN_TEST(a_program_that_goes_on_when_the_12th_byte_is_there_is_early);
     RUN_TEST(a_program_that_reads_12_bytes_of_14_leaves_2_unread);

@@ -87,6 +87,15 @@ class Lint(realtime.TestCase):
                 status, _, err = emulator("run", "mpc", "--strict", "--clock", clock, "--", *example("stage_fixed.py"))
                 self.assertEqual((0, ""), (status, err))
 
+    def test_thirteen_bytes_of_each_position(self):
+        """However quick the program is, and what was seen of it when: it is one bug, and has one name."""
+        program = ("import os, serial, sys, time\np = serial.Serial(os.environ['DRYRIG_PORT'], 128000, timeout=5)\n"
+                   "for _ in range(5):\n    time.sleep(float(sys.argv[1]))\n    p.write(b'C')\n    p.read(13)\np.close()\n")
+        for clock, pause in (("jump", "0"), ("jump", "0.003"), ("jump", "0.02"), ("real", "0.003"), ("real", "0.02")):
+            with self.subTest(f"{clock} {pause}"):
+                _, _, err = emulator("run", "mpc", "--clock", clock, "--", sys.executable, "-c", program, pause)
+                self.assertEqual(["16 thirteen-bytes, 5 times"], re.findall(r"^\d.*", err, re.MULTILINE), err)
+
     def test_strict_changes_nothing_but_0(self):
         burst = "exec 3<>$DRYRIG_PORT; printf 'CC' >&3; dd bs=28 count=1 iflag=fullblock <&3 2>&1 >/dev/null; exit "
         for wanted, options in ((0, []), (3, ["--strict"]), (0, ["--lint=off"])):
