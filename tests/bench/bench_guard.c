@@ -10,6 +10,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,7 +27,7 @@
 
 static pid_t running[PROGRAMS_MAX];
 static unsigned running_count;
-static char folder[] = "/tmp/dryrig-bench-XXXXXX", config[64];
+static char folder[] = "/tmp/dryrig-bench-XXXXXX", config[64], recorded[64], logged[64];
 
 static void end_programs(void)
 {
@@ -41,6 +42,8 @@ static void clean_up(void)
 {
     end_programs();
     (void)unlink(config);
+    (void)unlink(recorded);
+    (void)unlink(logged);
     (void)rmdir(folder);
 }
 
@@ -177,8 +180,8 @@ static void write_config(const char *kind)
 
 /* -- Round trips ----------------------------------------------------------------------------------------------------------- */
 
-/* Less than 0: no whole answer within a second. */
-static double ask(int fd)
+/* Less than 0: no whole answer within the limit. */
+static double ask(int fd, int limit_ms)
 {
     unsigned char reply[REPLY];
     struct pollfd answers = {fd, POLLIN, 0};
@@ -186,7 +189,7 @@ static double ask(int fd)
     if (write(fd, "C", 1) != 1)
         give_up("write");
     for (size_t have = 0; have < sizeof reply;) {
-        if (poll(&answers, 1, 1000) != 1)
+        if (poll(&answers, 1, limit_ms) != 1)
             return -1;
         const ssize_t got = read(fd, reply + have, sizeof reply - have);
         if (got <= 0)
@@ -202,22 +205,24 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void compare(const char *emulator, const char *guard, const char *kind, const char *pace, unsigned queries)
+static void compare(const char *emulator, const char *guard, const char *kind, const char *pace, bool keeps,
+                    unsigned queries)
 {
     char ports[2][64] = {"", ""}, guarded[64] = "";
     static double times_us[2][100000];
     write_config(kind);
     for (unsigned i = 0; i < 2; i++)
         start_program(ports[i], emulator, kind, "--pace", pace, "--device", "MP-845", (char *)NULL);
-    start_program(guarded, guard, "--port", ports[1], "--config", config, (char *)NULL);
+    start_program(guarded, guard, "--port", ports[1], "--config", config, keeps ? "--record" : (char *)NULL, recorded,
+                  "--log", logged, (char *)NULL);
     const int hosts[2] = {start_pass_through(ports[0]), open_raw(guarded)};
-    for (unsigned tries = 0; ask(hosts[1]) < 0; tries++) /* the guard proves first who the controller is */
-        if (tries > 10)
+    for (unsigned tries = 0; ask(hosts[1], 1000) < 0; tries++) /* the guard proves first who the controller is */
+        if (tries > 60)
             give_up("the guard does not let a query pass");
     for (unsigned round = 0; round < ROUNDS; round++)
         for (unsigned which = 0; which < 2; which++)
             for (unsigned i = round * queries / ROUNDS; i < (round + 1) * queries / ROUNDS; i++)
-                if ((times_us[which][i] = ask(hosts[which])) < 0)
+                if ((times_us[which][i] = ask(hosts[which], 60000)) < 0)
                     give_up("no answer");
     for (unsigned which = 0; which < 2; which++) {
         qsort(times_us[which], queries, sizeof times_us[which][0], ascending);
@@ -226,8 +231,8 @@ static void compare(const char *emulator, const char *guard, const char *kind, c
     end_programs();
     const double median[2] = {times_us[0][queries / 2], times_us[1][queries / 2]};
     const double late[2] = {times_us[0][queries * 99 / 100], times_us[1][queries * 99 / 100]};
-    printf("%-5s %-6s %12.1f %12.1f %10.1f %8.2f %12.1f %12.1f\n", kind, pace, median[0], median[1],
-           median[1] - median[0], median[1] / median[0], late[0], late[1]);
+    printf("%-5s %-6s %-9s %12.1f %12.1f %10.1f %8.2f %12.1f %12.1f\n", kind, pace, keeps ? "--record" : "", median[0],
+           median[1], median[1] - median[0], median[1] / median[0], late[0], late[1]);
     (void)fflush(stdout);
 }
 
@@ -245,11 +250,14 @@ int main(int argc, char **argv)
            "78.1 on an "
            "MPC-200's)\n",
            queries);
-    printf("%-5s %-6s %12s %12s %10s %8s %12s %12s\n", "", "pace", "pass-through", "guard", "added", "ratio",
+    printf("%-5s %-6s %-9s %12s %12s %10s %8s %12s %12s\n", "", "pace", "", "pass-through", "guard", "added", "ratio",
            "99 % p.-th.", "99 % guard");
-    compare(argv[1], argv[2], "mpc", "off", queries);
-    compare(argv[1], argv[2], "mpc", "on", queries);
-    compare(argv[1], argv[2], "trio", "on", queries);
+    (void)snprintf(recorded, sizeof recorded, "%s/line.rec", folder);
+    (void)snprintf(logged, sizeof logged, "%s/rig.log", folder);
+    compare(argv[1], argv[2], "mpc", "off", false, queries);
+    compare(argv[1], argv[2], "mpc", "off", true, queries);
+    compare(argv[1], argv[2], "mpc", "on", false, queries);
+    compare(argv[1], argv[2], "trio", "on", false, queries);
     clean_up();
     return 0;
 }
