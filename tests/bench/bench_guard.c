@@ -199,6 +199,21 @@ static double ask(int fd, int limit_ms)
     return now_us() - before;
 }
 
+/* A guard takes a pause of 100 ms within a reply for its end, and a busy machine makes one now and then: it costs the answer,
+ * not the run. */
+static double ask_until_answered(int fd)
+{
+    double took_us = -1;
+    for (unsigned tries = 0; took_us < 0; tries++) {
+        if (tries == 10)
+            give_up("no answer");
+        took_us = ask(fd, 5000);
+        if (took_us < 0)
+            (void)tcflush(fd, TCIFLUSH);
+    }
+    return took_us;
+}
+
 static int ascending(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
@@ -222,8 +237,7 @@ static void compare(const char *emulator, const char *guard, const char *kind, c
     for (unsigned round = 0; round < ROUNDS; round++)
         for (unsigned which = 0; which < 2; which++)
             for (unsigned i = round * queries / ROUNDS; i < (round + 1) * queries / ROUNDS; i++)
-                if ((times_us[which][i] = ask(hosts[which], 60000)) < 0)
-                    give_up("no answer");
+                times_us[which][i] = ask_until_answered(hosts[which]);
     for (unsigned which = 0; which < 2; which++) {
         qsort(times_us[which], queries, sizeof times_us[which][0], ascending);
         (void)close(hosts[which]);
