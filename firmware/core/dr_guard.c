@@ -1,7 +1,6 @@
 #include "dr_guard_rooms.h"
 
 #define LINE_KEEPS_US MS(100) /* a frame of 14 bytes takes 2.4 ms; a USB converter's latency is 16 ms */
-#define LINE_HEAD 2u          /* bytes before that pause: 'S' and the speed */
 #define RATE_TOKENS 20u
 #define EVENTS_MAX 16u /* at most so many in one call; a caller who comes that late is due again at once */
 
@@ -138,6 +137,8 @@ void dr_guard_push_device(dr_guard *g, dr_us now, const uint8_t *bytes, size_t c
 /* The last byte of a frame, or of the guard's own query, is on the wire. */
 static void frame_sent(dr_guard *g, dr_us now)
 {
+    if (g->read_phase == READ_SENT)
+        g->asked_at = now;
     if (g->out_count > 1u)
         dr_g_set_timer(g, DR_TIMER_LINE, now + LINE_KEEPS_US);
     if (g->task == TASK_SEND) {
@@ -160,8 +161,8 @@ size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room)
         if (g->stops_out > 0 && !is_leaving(g)) {
             g->stops_out--;
             bytes[count++] = DR_INTERRUPT;
-        } else if (g->out_at < g->out_ready && g->out_at == 0 && g->task == TASK_SEND && dr_g_is_late(g, now)) {
-            dr_g_check_again(g, now);
+        } else if (g->out_at < g->out_ready && g->task == TASK_SEND && dr_g_is_late(g, now)) {
+            dr_g_come_late(g, now);
         } else if (g->out_at < g->out_ready) {
             bytes[count++] = g->out[g->out_at++];
             if (g->out_at == g->out_count)

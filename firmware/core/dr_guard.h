@@ -124,7 +124,8 @@ typedef enum {
     DR_STOP_EARLY_CR,
     DR_STOP_AGAIN,
     DR_STOP_AFTER_RESET,
-    DR_STOP_NOISE
+    DR_STOP_NOISE,
+    DR_STOP_LATE /* in the pause within 'S': its reading is too old by now */
 } dr_stop_cause;
 
 /* -- The guard ------------------------------------------------------------------------------------------------------ */
@@ -198,6 +199,7 @@ typedef struct {
     uint8_t attempts;                                    /* at the proof of identity */
 
     uint8_t read_phase; /* of the guard's own position query */
+    dr_us asked_at;     /* it left */
     uint8_t read[DR_REPLY_MAX], read_have;
     bool read_again;
     bool has_first; /* first_steps holds the first of two readings that must agree */

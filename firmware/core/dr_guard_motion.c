@@ -63,6 +63,12 @@ void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply)
         read_again(g, now);
         return;
     }
+    const dr_us took = now - g->asked_at;
+    g->scene.waited_us = took > DR_ANSWER_US ? took - DR_ANSWER_US : 0;
+    if (g->scene.waited_us > DR_WAITED_MAX_US && !has_rig(g, DR_RIG_KNOBS_LOCKED)) {
+        read_again(g, now);
+        return;
+    }
     g->scene.may_calibrate = is_on(g, DR_INPUT_MAY_CALIBRATE);
     g->scene.in_tissue = is_on(g, DR_INPUT_IN_TISSUE);
     const dr_verdict verdict = dr_judge_motion(g->limits, &g->scene, &g->command, &g->request);
@@ -91,20 +97,36 @@ void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply)
     dr_g_log_bytes(g, now, DR_EVENT_ALLOWED, again, g->command.op, g->frame, length);
 }
 
-/* The margin reckons with what a knob can do from the reading until the motion begins. Who comes later, a suspended program or a
- * slow machine, would let it begin somewhere else. */
-bool dr_g_is_late(const dr_guard *g, dr_us now)
+/* How much longer than the margin reckons with a knob has had since the reading, if the rest of the frame leaves now. */
+static dr_us beyond_window(const dr_guard *g, dr_us now)
 {
-    const dr_us until_it_begins = FRAME_US + (g->command.op == DR_OP_MPC_LINE ? LINE_PAUSE_US : 0);
-    const dr_us window = g->command.op == DR_OP_MPC_LINE ? DR_WINDOW_MPC_LINE_US : DR_WINDOW_US;
-    return !has_rig(g, DR_RIG_KNOBS_LOCKED) && now - g->position_at > window - until_it_begins;
+    const bool line = g->command.op == DR_OP_MPC_LINE;
+    const dr_us until_it_begins = FRAME_US + (line && g->out_at == 0 ? LINE_PAUSE_US : 0);
+    const dr_us age = now - g->asked_at, window = line ? DR_WINDOW_MPC_LINE_US : DR_WINDOW_US;
+    return age > window - until_it_begins ? age - (window - until_it_begins) : 0;
 }
 
-void dr_g_check_again(dr_guard *g, dr_us now)
+/* Who comes later, a suspended program or a slow machine, would let it begin somewhere else. */
+bool dr_g_is_late(const dr_guard *g, dr_us now)
 {
-    dr_g_withdraw(g);
-    dr_g_end_task(g);
-    read_again(g, now);
+    const bool about_to_begin = g->out_at == 0 || (g->command.op == DR_OP_MPC_LINE && g->out_at == LINE_HEAD);
+    return about_to_begin && !has_rig(g, DR_RIG_KNOBS_LOCKED) && beyond_window(g, now) > g->scene.waited_us;
+}
+
+/* What has begun cannot be taken back, nor be left as it is. It goes on if it may from wherever a knob can have moved the tip
+ * by now; if not, it is finished and ^C follows at its heels. */
+void dr_g_come_late(dr_guard *g, dr_us now)
+{
+    if (g->out_at == 0) {
+        dr_g_withdraw(g);
+        dr_g_end_task(g);
+        read_again(g, now);
+        return;
+    }
+    g->scene.waited_us = beyond_window(g, now);
+    if (g->scene.waited_us > DR_WAITED_MAX_US ||
+        dr_judge_motion(g->limits, &g->scene, &g->command, &g->request).reason != DR_REASON_NONE)
+        dr_g_begin_stop(g, now, DR_STOP_LATE, DR_FAULT_NONE, 0);
 }
 
 /* Where the motion may rightly end: at its target; without Y where homing leaves it out; where it began, if it was so short

@@ -66,13 +66,21 @@ void dr_g_know_place(dr_guard *g, dr_us now, const dr_reply *reply)
     dr_g_set_timer(g, DR_TIMER_STALE, now + STALE_US);
 }
 
-/* Has the tip moved farther than a knob can have moved it since? */
+/* Where a controller begins that has lost its power and its count with it, wherever the tip is [S]. */
+static bool is_origin(const dr_reply *reply)
+{
+    return reply->steps[DR_X] == 0 && reply->steps[DR_Y] == 0 && reply->steps[DR_Z] == 0;
+}
+
+/* Has the tip moved farther than a knob can have moved it since, or the count without the tip? */
 bool dr_g_has_jumped(const dr_guard *g, dr_us now, const dr_reply *reply)
 {
     const uint8_t drive = kind_of(g) == DR_TRIO ? 0 : (uint8_t)(reply->value - 1u);
     dr_stage stage;
     if (drive != g->scene.drive || !dr_stage_get((dr_stage_id)g->limits->drives[drive].stage, &stage))
         return false;
+    if (is_origin(reply) && !same_place(g->scene.start_steps, reply->steps))
+        return true;
     const bool locked = has_rig(g, DR_RIG_KNOBS_LOCKED);
     if (!locked && !is_running(g, DR_TIMER_STALE))
         return false;

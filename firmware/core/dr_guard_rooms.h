@@ -51,6 +51,7 @@ typedef enum { NEWS_NONE, NEWS_MOVED, NEWS_OTHER /* angle or drive */ } dr_news;
 
 #define MS(ms) ((dr_us)(ms)*1000u)
 #define FRAME_GAP_US MS(2)   /* between two frames to the controller */
+#define LINE_HEAD 2u         /* bytes of an 'S' before its pause: 'S' and the speed */
 #define LINE_PAUSE_US MS(35) /* within the 'S' of an MPC-200: 30 ms [M note 10], and some */
 #define REPLY_TIMEOUT_US MS(2000)
 #define QUIET_US MS(100)
@@ -150,9 +151,9 @@ void dr_g_fall_back(dr_guard *g, dr_us now); /* no limits afterwards */
 /* -- dr_guard_motion --------------------------------------------------------------------------------------------------- */
 
 void dr_g_read_for_motion(dr_guard *g, dr_us now, const dr_reply *reply);
-bool dr_g_is_late(const dr_guard *g,
-                  dr_us now); /* a motion that has not begun to leave: is its reading too old by now? */
-void dr_g_check_again(dr_guard *g, dr_us now); /* reads anew, or refuses */
+/* A motion that is about to leave, or an 'S' after its pause: is its reading too old by now? */
+bool dr_g_is_late(const dr_guard *g, dr_us now);
+void dr_g_come_late(dr_guard *g, dr_us now); /* then: reads anew, refuses, or stops what has begun */
 dr_us dr_g_longest_us(const dr_guard *g);
 void dr_g_read_for_end(dr_guard *g, dr_us now, const dr_reply *reply);
 

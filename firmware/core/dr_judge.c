@@ -196,9 +196,10 @@ dr_path dr_judge_path(const dr_limits *l, const dr_scene *scene, const dr_comman
     return path;
 }
 
-int32_t dr_judge_margin_q(const dr_limits *l, const dr_command *command)
+int32_t dr_judge_margin_q(const dr_limits *l, const dr_scene *scene, const dr_command *command)
 {
-    const int64_t window_us = command->op == DR_OP_MPC_LINE ? DR_WINDOW_MPC_LINE_US : DR_WINDOW_US;
+    const int64_t window_us =
+        (command->op == DR_OP_MPC_LINE ? DR_WINDOW_MPC_LINE_US : DR_WINDOW_US) + (int64_t)scene->waited_us;
     if (has(l, DR_RIG_KNOBS_LOCKED))
         return l->margin_q;
     return l->margin_q + (int32_t)((l->knob_q_per_s * window_us + DR_US_PER_S - 1) / DR_US_PER_S);
@@ -488,7 +489,7 @@ dr_verdict dr_judge_motion(const dr_limits *l, const dr_scene *scene, const dr_c
             return refuse(DR_REASON_RANGE, axis, request->steps[axis], stage.travel_steps[axis]);
 
     const dr_path path = dr_judge_path(l, scene, command, request);
-    const int32_t margin_q = dr_judge_margin_q(l, command);
+    const int32_t margin_q = dr_judge_margin_q(l, scene, command);
     if (calibrates(command->op))
         return judge_calibration(l, scene, &path, margin_q);
     if (scene->frame_lost)

@@ -12,10 +12,13 @@
 extern "C" {
 #endif
 
-/* From the answer to the guard's query until the motion begins, a knob may move the tip: the gap on the wire and the frame,
- * and on an MPC-200 the pause within 'S'. The margin has room for that, and the guard keeps to it. */
+/* From the guard's query until the motion begins, a knob may move the tip: the query, up to DR_ANSWER_US of the wait for its
+ * answer, the gap on the wire and the frame, and on an MPC-200 the pause within 'S'. The margin has room for that, and for
+ * what it takes longer (dr_scene.waited_us); the guard keeps to it. */
 #define DR_WINDOW_US 10000
 #define DR_WINDOW_MPC_LINE_US 50000
+#define DR_ANSWER_US 3000       /* 15 bytes of a TRIO take 2,604 us */
+#define DR_WAITED_MAX_US 100000 /* a reading that is older is taken again */
 
 /* Why something was refused, or dropped. `limit` and `measured` of a verdict are in the units given here. */
 typedef enum {
@@ -74,6 +77,7 @@ typedef struct {
 /* What the guard knows when a motion is asked for. */
 typedef struct {
     uint32_t start_steps[DR_AXES]; /* from a query a moment ago */
+    uint32_t waited_us;            /* for it, beyond the window: 0..DR_WAITED_MAX_US */
     uint8_t drive;                 /* index of the drive that the controller says is active (TRIO: 0) */
     uint8_t chosen;                /* index of the drive that the host chose */
     uint8_t angle_deg;             /* TRIO */
@@ -101,7 +105,7 @@ dr_verdict dr_judge_motion(const dr_limits *limits, const dr_scene *scene, const
 dr_path dr_judge_path(const dr_limits *limits, const dr_scene *scene, const dr_command *command,
                       const dr_request *request);
 /* By how much ways of this command are grown: margin, and what a knob may do before the motion begins. */
-int32_t dr_judge_margin_q(const dr_limits *limits, const dr_command *command);
+int32_t dr_judge_margin_q(const dr_limits *limits, const dr_scene *scene, const dr_command *command);
 /* Is the tip in the box and clear of obstacles? Else why not (DR_REASON_LIMIT, _KEEP_OUT, or _DRIVE). */
 dr_verdict dr_judge_place(const dr_limits *limits, uint8_t drive, const uint32_t steps[DR_AXES]);
 /* The speed to reckon with: the faster (fastest) or slower (!fastest) of the documented and the measured; quanta/s. */

@@ -839,6 +839,41 @@ static void row_55_a_controller_that_was_power_cycled(void)
     expect_fault(DR_FAULT_POSITION_JUMP);
 }
 
+/* A controller that has lost its count tells 0, 0, 0 wherever the tip is; a knob could have been there after a while. */
+static void row_55_a_count_that_was_lost(void)
+{
+    for (int i = 0; i < 4; i++) {
+        fake_rig();
+        rig.limits.rig = 0;
+        for (uint8_t axis = 0; axis < DR_AXES; axis++)
+            rig.limits.drives[0].box_q.min_q[axis] = 0;
+        limits_changed();
+        host_code('c');
+        fake_ms(30000);
+        for (int axis = 0; axis < 3; axis++)
+            fake.at[axis] = axis == i ? 8u : 0;
+        host_line(15, 800, 800, 800);
+        fake_ms(400);
+        expect_fault(i < 3 ? DR_FAULT_NONE : DR_FAULT_POSITION_JUMP);
+        if (i == 3)
+            expect_refused(DR_REASON_NO_POSITION);
+    }
+    fake_rig(); /* it was at 0, 0, 0 before */
+    rig.limits.rig = 0;
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        rig.limits.drives[0].box_q.min_q[axis] = 0;
+    limits_changed();
+    input(DR_INPUT_KEY, false);
+    fake.at[0] = fake.at[1] = fake.at[2] = 0;
+    input(DR_INPUT_KEY, true);
+    press(DR_INPUT_ARM);
+    fake_ms(150);
+    expect_state(DR_GUARD_IDLE);
+    host_code('c');
+    fake_ms(100);
+    expect_fault(DR_FAULT_NONE);
+}
+
 static void row_55_a_knob_is_no_faster_than_a_knob(void)
 {
     static const struct {
@@ -1329,6 +1364,7 @@ int main(void)
     RUN_TEST(row_54_another_firmware_locks);
     RUN_TEST(the_other_controller_is_not_taken_for_the_one_of_the_limits);
     RUN_TEST(row_55_a_controller_that_was_power_cycled);
+    RUN_TEST(row_55_a_count_that_was_lost);
     RUN_TEST(row_55_a_knob_is_no_faster_than_a_knob);
     RUN_TEST(row_56_the_pause_that_the_controller_needs);
     RUN_TEST(row_57_bytes_that_nobody_asked_for);

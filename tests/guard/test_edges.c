@@ -1205,11 +1205,11 @@ static void row_59_a_reading_that_is_too_old_is_taken_again(void)
                 run_us(50);
             const uint32_t queries = rig.wire_count;
             rig.now +=
-                1000 * late_ms; /* to 7.5 ms after the reading it may begin; to 12.5 ms with the pause within 'S' */
+                1000 * late_ms; /* to 7.5 ms after the query it may begin; to 12.5 ms with the pause within 'S' */
             run_ms(300);
             expect_cr();
             expect_tip(0, at + 800, at, at);
-            const bool again = late_ms > (kind == DR_TRIO ? 6 : 11);
+            const bool again = late_ms > (kind == DR_TRIO ? 4 : 11);
             TEST_ASSERT_EQUAL(again ? 'C' : 'S', rig.wire[queries] == 'c' ? 'C' : rig.wire[queries]);
             TEST_ASSERT_EQUAL(again, last_record(DR_EVENT_ALLOWED)->code);
             TEST_ASSERT_EQUAL(1, status().forwarded);

@@ -254,10 +254,13 @@ static void knobs_that_are_not_locked_widen_the_margin(void)
     limits.margin_q = UM(50);
     TEST_ASSERT_TRUE(dr_command_find(DR_MPC, 0x0321, 'S', &line));
     TEST_ASSERT_TRUE(dr_command_find(DR_MPC, 0x0321, 'M', &move));
-    TEST_ASSERT_EQUAL(UM(300), dr_judge_margin_q(&limits, &line)); /* 5 mm/s for 50 ms */
-    TEST_ASSERT_EQUAL(UM(100), dr_judge_margin_q(&limits, &move)); /* for 10 ms */
+    TEST_ASSERT_EQUAL(UM(300), dr_judge_margin_q(&limits, &scene, &line)); /* 5 mm/s for 50 ms */
+    TEST_ASSERT_EQUAL(UM(100), dr_judge_margin_q(&limits, &scene, &move)); /* for 10 ms */
+    scene.waited_us = DR_WAITED_MAX_US;                                    /* 100 ms longer */
+    TEST_ASSERT_EQUAL(UM(800), dr_judge_margin_q(&limits, &scene, &line));
+    TEST_ASSERT_EQUAL(UM(600), dr_judge_margin_q(&limits, &scene, &move));
     limits.rig = DR_RIG_KNOBS_LOCKED;
-    TEST_ASSERT_EQUAL(UM(50), dr_judge_margin_q(&limits, &line));
+    TEST_ASSERT_EQUAL(UM(50), dr_judge_margin_q(&limits, &scene, &line));
 }
 
 /* -- Rows 7, 8, 9, 14 ------------------------------------------------------------------------------------------------------------ */
@@ -761,14 +764,14 @@ static void the_window_of_a_knob_is_rounded_up(void)
     TEST_ASSERT_TRUE(dr_command_find(DR_MPC, 0x0321, 'S', &line));
     TEST_ASSERT_TRUE(dr_command_find(DR_MPC, 0x0321, 'M', &move));
     limits.knob_q_per_s = 1;
-    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &line));
-    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &move));
+    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &scene, &line));
+    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &scene, &move));
     limits.knob_q_per_s = 100;
-    TEST_ASSERT_EQUAL(5, dr_judge_margin_q(&limits, &line));
-    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &move));
+    TEST_ASSERT_EQUAL(5, dr_judge_margin_q(&limits, &scene, &line));
+    TEST_ASSERT_EQUAL(1, dr_judge_margin_q(&limits, &scene, &move));
     limits.knob_q_per_s = 101;
-    TEST_ASSERT_EQUAL(6, dr_judge_margin_q(&limits, &line));
-    TEST_ASSERT_EQUAL(2, dr_judge_margin_q(&limits, &move));
+    TEST_ASSERT_EQUAL(6, dr_judge_margin_q(&limits, &scene, &line));
+    TEST_ASSERT_EQUAL(2, dr_judge_margin_q(&limits, &scene, &move));
 }
 
 static void every_obstacle_counts_and_none_beyond_the_count(void)

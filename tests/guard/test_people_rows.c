@@ -56,6 +56,90 @@ static void row_59_a_knob_turned_between_the_query_and_the_motion(void)
     expect_silence();
 }
 
+/* What an answer tells was true when it was asked for, at the earliest. 200 um beside an obstacle, with a margin of 50 um and
+ * a knob of 5 mm/s: 30 ms are enough to be in its way. */
+static void row_59_an_answer_is_as_old_as_its_query(void)
+{
+    static const struct {
+        unsigned after_ms;
+        bool knobs_locked;
+        char then; /* A: allowed, R: refused, C: asked again */
+    } answers[] = {{1, false, 'A'},  {19, false, 'A'},  {23, false, 'R'}, {40, false, 'R'},
+                   {104, false, 'C'}, {1500, false, 'C'}, {1500, true, 'A'}};
+    for (size_t i = 0; i < sizeof answers / sizeof *answers; i++) {
+        bench_trio();
+        rig.limits.rig = answers[i].knobs_locked ? DR_RIG_KNOBS_LOCKED : 0;
+        (void)keep_out(5300, 5400, 5200, 5600, 4000, 6000);
+        bench_start();
+        bench_arm();
+        rig.by_hand = true;
+        const uint32_t before = rig.wire_count;
+        host_line(15, 44000, 40000, 40000);
+        for (unsigned us = 0; us < 10000 && rig.wire_count == before; us += 50)
+            run_us(50);
+        run_ms(answers[i].after_ms);
+        device_at_home();
+        run_ms(10);
+        switch (answers[i].then) {
+        case 'A':
+            TEST_ASSERT_EQUAL('S', rig.wire[before + 1]);
+            break;
+        case 'R':
+            expect_refused(DR_REASON_KEEP_OUT);
+            TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
+            break;
+        default:
+            TEST_ASSERT_EQUAL(before + 2, rig.wire_count);
+            TEST_ASSERT_EQUAL('c', rig.wire[before + 1]);
+            expect_state(DR_GUARD_CHECKING);
+            device_at_home();
+            run_ms(10);
+            TEST_ASSERT_EQUAL('S', rig.wire[before + 2]);
+            break;
+        }
+    }
+}
+
+/* In the pause within an 'S' a suspended guard comes late. The frame cannot be taken back: it goes on where all that a knob
+ * can have done by now leaves the way clear, else ^C follows at its heels. 350 um beside an obstacle. */
+static void row_59_a_guard_that_is_late_in_the_pause_within_s(void)
+{
+    static const struct {
+        unsigned late_ms;
+        bool knobs_locked, obstacle, stops;
+    } pauses[] = {{0, false, true, false},    {40, false, true, false},   {60, false, true, true},
+                  {60, false, false, false},  {100, false, false, false}, {150, false, false, true},
+                  {5000, false, false, true}, {5000, true, true, false}};
+    for (size_t i = 0; i < sizeof pauses / sizeof *pauses; i++) {
+        bench_mpc();
+        rig.limits.rig = pauses[i].knobs_locked ? DR_RIG_KNOBS_LOCKED : 0;
+        if (pauses[i].obstacle)
+            (void)keep_out(5100, 5400, 5350, 5600, 4000, 6000);
+        bench_start();
+        bench_arm();
+        const uint32_t before = rig.wire_count;
+        host_line(15, 88000, 80000, 80000);
+        for (unsigned us = 0; us < 20000 && rig.guard.out_at < 2; us += 50)
+            run_us(50);
+        TEST_ASSERT_EQUAL(2, rig.guard.out_at);
+        rig.now += 1000 * pauses[i].late_ms;
+        run_ms(4000);
+        TEST_ASSERT_EQUAL('S', rig.wire[before + 1]);
+        expect_state(DR_GUARD_IDLE);
+        expect_fault(DR_FAULT_NONE);
+        if (!pauses[i].stops) {
+            expect_cr();
+            expect_tip(0, 88000, 80000, 80000);
+            continue;
+        }
+        TEST_ASSERT_EQUAL_HEX8(0x03, rig.wire[before + 1 + 14]);
+        TEST_ASSERT_UINT32_WITHIN(1000, (uint32_t)rig.wire_at[before + 14], (uint32_t)rig.wire_at[before + 15]);
+        TEST_ASSERT_EQUAL(DR_STOP_LATE, last_record(DR_EVENT_STOP)->code);
+        TEST_ASSERT_LESS_THAN(80000 + 10 * 16, rig.controller.drives[0].position_steps[DR_X]); /* 10 um */
+        expect_silence();
+    }
+}
+
 static void row_60_another_drive_by_hand_during_the_move(void)
 {
     bench_armed_mpc();
@@ -688,6 +772,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(row_58_a_knob_turned_between_commands);
     RUN_TEST(row_59_a_knob_turned_between_the_query_and_the_motion);
+    RUN_TEST(row_59_an_answer_is_as_old_as_its_query);
+    RUN_TEST(row_59_a_guard_that_is_late_in_the_pause_within_s);
     RUN_TEST(row_60_another_drive_by_hand_during_the_move);
     RUN_TEST(row_60_another_drive_by_hand_before_the_move);
     RUN_TEST(row_63_a_changed_tip_disarms_until_it_is_confirmed);

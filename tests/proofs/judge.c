@@ -44,6 +44,7 @@ static void any_motion(void)
     assume(limits.beyond_zero_q >= 0 && limits.beyond_zero_q <= 640000);
     assume(limits.obstacle_count <= DR_OBSTACLES_MAX);
     scene.drive = DR_PROOF_DRIVE;
+    scene.waited_us = (uint32_t)anything_between(0, DR_WAITED_MAX_US);
     scene.may_calibrate = anything();
     scene.in_tissue = anything();
     scene.frame_lost = anything();

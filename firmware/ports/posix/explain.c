@@ -345,7 +345,7 @@ static void print_way(FILE *out, const rig *r, const dr_scene *scene, const dr_c
         print_box(out, &path.swept[stage]);
         (void)fprintf(out, "\n");
     }
-    (void)fprintf(out, "  margin          %s um around it\n", um(a, dr_judge_margin_q(&r->limits, command)));
+    (void)fprintf(out, "  margin          %s um around it\n", um(a, dr_judge_margin_q(&r->limits, scene, command)));
 }
 
 static explain_result explain_split(FILE *out, const rig *r, const explain_scene *s, line *words, char *why,

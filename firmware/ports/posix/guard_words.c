@@ -290,6 +290,7 @@ static const char *stop_cause(uint8_t code)
         [DR_STOP_AGAIN] = "repeated: not at rest yet",
         [DR_STOP_AFTER_RESET] = "the guard was not stopped in order before",
         [DR_STOP_NOISE] = "the controller sends what nobody asked for",
+        [DR_STOP_LATE] = "the guard came too late in the pause within S: by now the tip may be somewhere else",
     };
     return pick(causes, COUNT(causes), code);
 }
