@@ -188,20 +188,12 @@ def each_test(suite):
 
 def main(threads=4):
     """unittest.main(), with several tests at once: each waits most of its time, for the second after which a controller is asked
-    who it is. With arguments it is unittest.main() itself.
-
-    The guard's limits are real time, here as on a rig: 1 s to prove rest, 2 s for an answer. Where a machine is too busy for that
-    with several at once, a test that failed has a second try, alone."""
+    who it is. With arguments it is unittest.main() itself."""
     if len(sys.argv) > 1:
         unittest.main(module="__main__")
     tests = list(each_test(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])))
     with concurrent.futures.ThreadPoolExecutor(threads) as pool:
         results = list(pool.map(lambda test: test.run(), tests))
-    for i, result in enumerate(results):
-        if not result.wasSuccessful():
-            results[i] = tests[i].run()
-            print(f"{tests[i]}: {'failed' if not results[i].wasSuccessful() else 'not'} again, alone; at first:",
-                  *(words for _, words in result.failures + result.errors), sep="\n", file=sys.stderr)
     for result in results:
         for test, words in result.failures + result.errors:
             print(f"{test}\n{words}", file=sys.stderr)
