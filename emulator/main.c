@@ -318,14 +318,14 @@ static void close_kept(program *p)
 /* The panel is beside this program, or wherever programs are. */
 static bool start_panel(program *p)
 {
-    static char name[] = "dryrig-panel";
+    static char name[] = "dryrig-panel", own[] = "--own";
     char path[PATH_ROOM], socket[PATH_ROOM + RIG_NAME_MAX];
     const ssize_t length = readlink("/proc/self/exe", path, sizeof path - sizeof name);
     path[length > 0 ? length : 0] = '\0';
     char *const slash = strrchr(path, '/');
     memcpy(slash == NULL ? path : slash + 1, name, sizeof name);
     (void)snprintf(socket, sizeof socket, "%s", p->o->control);
-    char *command[] = {access(path, X_OK) == 0 ? path : name, socket, NULL};
+    char *command[] = {access(path, X_OK) == 0 ? path : name, own, socket, NULL};
     terminal_keep(&p->terminal);
     p->child = child_start(command, &p->mask_before, &p->status);
     return p->child > 0;

@@ -164,6 +164,7 @@ static bool do_state(telling *t)
     if (!telling_ends(t))
         return false;
     (void)cJSON_AddStringToObject(t->answer, "clock", modes[t->l->e->mode]);
+    (void)cJSON_AddBoolToObject(t->answer, "waits_for_client", t->l->e->waits_for_client);
     add_time(t);
     cJSON *const list = cJSON_AddArrayToObject(t->answer, "controllers");
     for (unsigned i = 0; i < t->l->e->station_count; i++)

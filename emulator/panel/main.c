@@ -25,9 +25,10 @@
 
 #define ASK_MOVING_MS 100
 #define ASK_RESTING_MS 300
-#define LISTEN_MS 20 /* between two readings: a stream has a thousand lines a second */
-#define DRAW_MS 50   /* at least between two pictures, however fast things happen */
-#define LINE 440u    /* the control channel takes 511 characters, the name of the controller included */
+#define LISTEN_MS 20   /* between two readings: a stream has a thousand lines a second */
+#define DRAW_MS 50     /* at least between two pictures, however fast things happen */
+#define SILENT_MS 2000 /* an emulator that owes an answer for so long is stopped, or at work */
+#define LINE 440u      /* the control channel takes 511 characters, the name of the controller included */
 #define KEY_ESCAPE 27
 #define KEY_DELETE 127
 
@@ -41,10 +42,13 @@ typedef struct {
 
     int64_t ask_ms, draw_ms, listen_ms; /* when next */
     bool waits;                         /* for the answers to what was asked */
+    int64_t asked_ms;                   /* when that was */
+    unsigned silent_s;                  /* since then, where it is too long */
     bool is_changed;                    /* since it was drawn */
     unsigned beeps;
 
     unsigned detents;
+    bool is_own; /* the emulator's panel: they end together */
     bool is_helping, is_typing;
     char typed[LINE - MODEL_NAME], message[MODEL_TEXT], next[MODEL_NAME];
 } panel;
@@ -93,6 +97,7 @@ static void ask(panel *p)
     if (p->m.name[0] != '\0' && p->m.is_known)
         say(p, "panel");
     p->waits = true;
+    p->asked_ms = now_ms();
 }
 
 static void order_lines(panel *p, const char *lines)
@@ -163,6 +168,14 @@ static void read_emulator(panel *p)
     p->listen_ms = now_ms() + LISTEN_MS;
     if (!is_there && !p->is_over)
         end(p, 1, "the emulator has ended");
+}
+
+static void watch_silence(panel *p)
+{
+    const int64_t silent_ms = p->waits ? now_ms() - p->asked_ms : 0;
+    const unsigned silent_s = silent_ms < SILENT_MS ? 0 : (unsigned)(silent_ms / 1000);
+    p->is_changed = p->is_changed || silent_s != p->silent_s;
+    p->silent_s = silent_s;
 }
 
 /* -- Keys ---------------------------------------------------------------------------------------------------------------- */
@@ -257,6 +270,8 @@ static void draw(panel *p)
 {
     const screen_view view = {.m = &p->m,
                               .detents = p->detents,
+                              .silent_s = p->silent_s,
+                              .is_own = p->is_own,
                               .prompt = p->is_typing ? p->typed : NULL,
                               .message = p->message[0] == '\0' ? NULL : p->message,
                               .is_helping = p->is_helping};
@@ -273,14 +288,14 @@ static int until(int64_t when_ms, int64_t now)
 static int sleep_ms(const panel *p)
 {
     const int64_t now = now_ms();
-    int64_t next = INT64_MAX;
-    if (!p->waits)
-        next = p->ask_ms;
+    int64_t next = p->ask_ms;
+    if (p->waits)
+        next = p->asked_ms + (p->silent_s > 0 ? (p->silent_s + 1) * 1000 : SILENT_MS);
     if (p->is_changed && p->draw_ms < next)
         next = p->draw_ms;
     if (p->listen_ms > now && p->listen_ms < next)
         next = p->listen_ms;
-    return next == INT64_MAX ? -1 : until(next, now);
+    return until(next, now);
 }
 
 static void run(panel *p)
@@ -305,6 +320,7 @@ static void run(panel *p)
             take_key(p, key);
         if (!p->waits && now_ms() >= p->ask_ms && !p->is_over)
             ask(p);
+        watch_silence(p);
         if (p->is_changed && now_ms() >= p->draw_ms && !p->is_over)
             draw(p);
     }
@@ -327,21 +343,35 @@ static bool open_signals(panel *p)
 
 const char *argp_program_version = "dryrig-panel " DRYRIG_VERSION;
 
+typedef struct {
+    const char *socket, *controller;
+    bool is_own;
+} options;
+
+#define OWN 1
+
 static error_t parse(int key, char *value, struct argp_state *state)
 {
-    const char **const words = state->input;
+    options *const o = state->input;
+    if (key == OWN) {
+        o->is_own = true;
+        return 0;
+    }
     if (key != ARGP_KEY_ARG)
         return ARGP_ERR_UNKNOWN;
     if (state->arg_num > 1)
         argp_error(state, "'%s' is one word too many", value);
-    words[state->arg_num] = value;
+    *(state->arg_num == 0 ? &o->socket : &o->controller) = value;
     return 0;
 }
 
 int main(int argc, char **argv)
 {
+    static const struct argp_option known[] = {
+        {"own", OWN, NULL, 0, "As 'dryrig-emu --panel' starts it: the emulator ends with this panel, and q says so", 0},
+        {0}};
     static const struct argp argp = {
-        NULL,
+        known,
         parse,
         "SOCKET [CONTROLLER]",
         "Shows and works the panel of an emulated controller: its display, buttons and knobs, where its device is, and "
@@ -352,10 +382,10 @@ int main(int argc, char **argv)
         NULL,
         NULL};
     static panel p;
-    const char *words[2] = {NULL, ""};
+    options o = {NULL, "", false};
     argp_err_exit_status = 2;
-    (void)argp_parse(&argp, argc, argv, 0, NULL, words);
-    if (words[0] == NULL) {
+    (void)argp_parse(&argp, argc, argv, 0, NULL, &o);
+    if (o.socket == NULL) {
         (void)fprintf(stderr, "dryrig-panel: which emulator? dryrig-panel SOCKET, the one of dryrig-emu --control\n");
         return 2;
     }
@@ -363,8 +393,8 @@ int main(int argc, char **argv)
         (void)fprintf(stderr, "dryrig-panel: a terminal is needed for input and output\n");
         return 2;
     }
-    if (!client_open(&p.link, words[0], p.why, sizeof p.why) || !open_signals(&p)) {
-        (void)fprintf(stderr, "dryrig-panel: %s: %s\n", words[0], p.why[0] != '\0' ? p.why : strerror(errno));
+    if (!client_open(&p.link, o.socket, p.why, sizeof p.why) || !open_signals(&p)) {
+        (void)fprintf(stderr, "dryrig-panel: %s: %s\n", o.socket, p.why[0] != '\0' ? p.why : strerror(errno));
         return 1;
     }
     if (!screen_open()) {
@@ -373,13 +403,14 @@ int main(int argc, char **argv)
         return 2;
     }
     p.detents = 10;
-    model_init(&p.m, words[1]);
+    p.is_own = o.is_own;
+    model_init(&p.m, o.controller);
     if (!client_say(&p.link, "subscribe"))
         end(&p, 1, "no memory");
     run(&p);
     screen_close();
     if (p.why[0] != '\0')
-        (void)fprintf(stderr, "dryrig-panel: %s: %s\n", words[0], p.why);
+        (void)fprintf(stderr, "dryrig-panel: %s: %s\n", o.socket, p.why);
     client_close(&p.link);
     (void)close(p.signals);
     return p.status;

@@ -170,6 +170,7 @@ static bool take_state(model *m, const cJSON *answer, char next[MODEL_NAME])
     const int count = cJSON_GetArraySize(list);
     bool done = false;
     take_text(answer, "clock", m->clock, sizeof m->clock);
+    m->waits_for_client = is_true(answer, "waits_for_client");
     m->now_us = number(answer, "now_us");
     for (int i = 0; i < count; i++) {
         const cJSON *const c = cJSON_GetArrayItem(list, i);

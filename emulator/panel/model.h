@@ -47,7 +47,8 @@ typedef struct {
     bool is_known;         /* `state` and `panel` have been answered */
     dr_kind kind;
     char firmware[16], port[256], state[16], clock[8];
-    bool is_open; /* a host has its port open */
+    bool is_open;          /* a host has its port open */
+    bool waits_for_client; /* and the clock stands until one has opened a port */
     uint64_t now_us;
     unsigned active; /* index of the active device */
     unsigned angle_deg;

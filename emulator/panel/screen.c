@@ -92,8 +92,9 @@ static void draw_box(int row, int column, int rows, int columns, const char *tit
     put(row, column + 2, columns - 4, " %s ", title);
 }
 
-static void draw_title(const model *m)
+static void draw_title(const screen_view *v)
 {
+    const model *const m = v->m;
     char left[160], right[64];
     const char *const host = m->port[0] == '\0' ? "unplugged" : m->is_open ? "open" : "nobody has it open";
     (void)snprintf(left, sizeof left, " %s %s  %.24s: %s", dr_words_controller(m->kind), m->firmware,
@@ -102,8 +103,8 @@ static void draw_title(const model *m)
         const size_t length = strlen(left);
         (void)snprintf(left + length, sizeof left - length, "  '%.12s', Tab: next", m->name);
     }
-    (void)snprintf(right, sizeof right, "%s %.3f s ", strcmp(m->clock, "real") == 0 ? "" : m->clock,
-                   (double)m->now_us / 1e6);
+    (void)snprintf(right, sizeof right, "%s%s %.3f s ", v->silent_s > 0 ? "NO ANSWER since " : "",
+                   strcmp(m->clock, "real") == 0 ? "" : m->clock, (double)m->now_us / 1e6);
     (void)attrset(A_REVERSE);
     (void)mvhline(0, 0, ' ' | A_REVERSE, COLS);
     put(0, COLS - (int)strlen(right), (int)strlen(right), "%s", right);
@@ -345,19 +346,38 @@ static void draw_log(const model *m, int row, int rows)
     }
 }
 
+static const char *what_q_does(const screen_view *v)
+{
+    return v->is_own ? "q ends the emulator too" : "q ends the panel alone";
+}
+
+/* What goes on by itself, and what keys are for. */
+static void draw_hints(const screen_view *v, int row)
+{
+    if (v->m->waits_for_client)
+        put(row, 0, COLS - 1, " the clock waits until a host opens the port   ? help   %s", what_q_does(v));
+    else if (strcmp(v->m->clock, "step") == 0)
+        put(row, 0, COLS - 1, " the clock stands: ':advance 1s' moves it   ? help   %s", what_q_does(v));
+    else
+        put(row, 0, COLS - 1, " ? help   o mains off, on   : any command   %s", what_q_does(v));
+}
+
 static void draw_last_line(const screen_view *v)
 {
     const int row = LINES - 1;
+    (void)attrset(v->prompt == NULL ? A_BOLD : A_NORMAL);
     if (v->prompt != NULL) {
         const int skip = (int)strlen(v->prompt) > COLS - 3 ? (int)strlen(v->prompt) - (COLS - 3) : 0;
         put(row, 0, COLS - 1, ":%s_", v->prompt + skip);
+    } else if (v->silent_s > 0) {
+        put(row, 0, COLS - 1, " The emulator has not answered for %u s. What is shown is old, and keys wait.",
+            v->silent_s);
     } else if (v->message != NULL) {
-        (void)attrset(A_BOLD);
         put(row, 0, COLS - 1, " %s", v->message);
-        (void)attrset(A_NORMAL);
-    } else {
-        put(row, 0, COLS - 1, " ? help   o mains off, on   : a command of dryrig-control(7)   q quit");
     }
+    (void)attrset(A_NORMAL);
+    if (v->prompt == NULL && v->silent_s == 0 && v->message == NULL && v->m->is_shown)
+        draw_hints(v, row);
 }
 
 /* -- The whole ----------------------------------------------------------------------------------------------------------- */
@@ -367,7 +387,7 @@ static void draw_help(const model *m)
     int row = 0;
     for (const char *const *line = controls_help(m->kind); *line != NULL && row < LINES - 2; line++)
         put(row++, 1, COLS - 1, "%s", *line);
-    put(LINES - 1, 0, COLS - 1, " n: detents a key   o: mains   : any command   q: quit   (any key: back)");
+    put(LINES - 1, 0, COLS - 1, " n detents a key   o mains   : a command of dryrig-control(7)   (any key: back)");
 }
 
 void screen_draw(const screen_view *v)
@@ -386,7 +406,7 @@ void screen_draw(const screen_view *v)
         draw_last_line(v);
     } else {
         const int views = VIEWS_MIN + (LINES - SCREEN_ROWS) / 2;
-        draw_title(m);
+        draw_title(v);
         draw_display(m);
         draw_buttons(m);
         draw_views(m, views);

@@ -13,6 +13,8 @@
 typedef struct {
     const model *m;
     unsigned detents;    /* a key turns a knob by */
+    unsigned silent_s;   /* so long the emulator has owed an answer; 0: it answers */
+    bool is_own;         /* the emulator ends with the panel */
     const char *prompt;  /* a command that is being typed; NULL: none */
     const char *message; /* for the last line; NULL: none */
     bool is_helping;

@@ -380,6 +380,57 @@ class Keys(unittest.TestCase):
                 process.communicate(timeout=emu.LIMIT_S)
 
 
+class Clock(unittest.TestCase):
+    """Whoever sees nothing happen is told why, and what helps."""
+
+    def test_one_that_stands(self):
+        with trio() as e, Terminal(PANEL, e.socket_path) as t:
+            t.shows("the clock stands: ':advance 1s' moves it   ? help   q ends the panel alone")
+            t.keys("h")
+            emu.wait_until(lambda: e.do("panel")["down"] == ["home"], "h presses HOME")
+            t.keys(":", *"advance 1s", "Enter")
+            t.shows("X      0.00", "step 1.000 s")
+
+    def test_one_that_goes(self):
+        for clock in "real", "jump":
+            with Rehearsal("trio", "--clock", clock) as e, Terminal(PANEL, e.socket_path) as t:
+                t.shows(" ? help   o mains off, on   : any command   q ends the panel alone")
+
+    def test_one_that_waits_for_a_host(self):
+        with Rehearsal("trio", "--wait-client") as e, Terminal(PANEL, e.socket_path) as t:
+            t.shows("the clock waits until a host opens the port   ? help   q ends the panel alone")
+            self.assertTrue(e.do("state")["waits_for_client"])
+            with emu.Port(e.path):
+                t.shows(": any command")
+            self.assertFalse(e.do("state")["waits_for_client"])
+
+    def test_an_emulator_that_is_stopped(self):
+        with trio() as e, Terminal(PANEL, e.socket_path) as t:
+            t.shows("X   1000.03  ABSOLUTE", "the clock stands")
+            os.kill(e.process.pid, signal.SIGSTOP)
+            try:
+                t.shows("NO ANSWER since", "The emulator has not answered for", "What is shown is old, and keys wait.")
+                self.assertIn("step 0.000 s", t.rows()[0])
+                self.assertLessEqual(max(len(row) for row in t.rows()), 80)
+                t.keys("Right", "?")  # waits, and needs no emulator
+                t.shows("First steps")
+                t.keys("?")
+            finally:
+                os.kill(e.process.pid, signal.SIGCONT)
+            t.shows("X   1060.03  ABSOLUTE")
+            emu.wait_until(lambda: "answer" not in t.rows()[23] and "ANSWER" not in t.rows()[0], "it answers again")
+
+    def test_a_panel_of_a_stopped_emulator_ends(self):
+        with trio() as e, Terminal(PANEL, e.socket_path) as t:
+            t.shows("ABSOLUTE")
+            os.kill(e.process.pid, signal.SIGSTOP)
+            try:
+                t.keys("q")
+                t.ended(0)
+            finally:
+                os.kill(e.process.pid, signal.SIGCONT)
+
+
 class Ends(unittest.TestCase):
     def test_q_and_signals(self):
         with trio() as e:
@@ -445,7 +496,7 @@ class InTheSameTerminal(unittest.TestCase):
     def test_it_ends_with_its_panel(self):
         for args in (("trio",), ("mpc", "--clock", "jump")):
             with self.emulator(*args, "--panel") as t:
-                t.shows("0.00", "? help")
+                t.shows("0.00", "? help", "q ends the emulator too")
                 t.keys("q")
                 text = t.ended(0)
                 self.assertNotIn("dryrig", text)
