@@ -11,6 +11,8 @@ import sys
 import time
 import unittest
 
+import realtime
+
 DRYRIG, AVR_BOARD, QEMU, BUILDS = (sys.argv.pop(1) for _ in range(4))
 LIMIT_S = 90  # that only a broken program reaches
 
@@ -38,7 +40,11 @@ class Rig:
         path = re.match(ready, self.process.stdout.readline()).group(1)
         stage = {"trio": "MP-845", "mpc": "MP-225"}[kind]
         self.options = ["--port", path, "--controller", kind, "--stage", stage]
-        time.sleep(3)  # the board starts, and a TRIO calibrates
+        end = time.monotonic() + LIMIT_S
+        while subprocess.run([DRYRIG, *self.options, "position"], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                             stderr=subprocess.DEVNULL, timeout=LIMIT_S).returncode != 0:  # it starts, and a TRIO calibrates
+            if time.monotonic() > end:
+                raise AssertionError("the board does not answer")
 
     def __enter__(self):
         return self
@@ -58,7 +64,7 @@ class Rig:
         return [json.loads(line) for line in self.run("--json", *words).splitlines() if line[:1] == "{"]
 
 
-class Boards(unittest.TestCase):
+class Boards(realtime.TestCase):
     def trio(self, board):
         with Rig(board, "trio") as rig:
             self.assertEqual("trio", rig.json("info")[-1]["controller"])
@@ -107,9 +113,9 @@ class Boards(unittest.TestCase):
 
     def test_interrupted_on_an_uno(self):
         with Rig("uno", "mpc") as rig:
-            process = subprocess.Popen([DRYRIG, *rig.options, "line", "5000", "0", "0", "--speed", "0"],
+            process = subprocess.Popen([DRYRIG, *rig.options, "--json", "line", "5000", "0", "0", "--speed", "0", "--stream"],
                                        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-            time.sleep(2)
+            process.stdout.readline()  # it moves
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=LIMIT_S)
             self.assertEqual(130, process.returncode)

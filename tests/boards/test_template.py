@@ -9,16 +9,19 @@ import time
 import unittest
 from pathlib import Path
 
+LIMIT_S = 60
 TRIO, MPC = (Path(sys.argv.pop(1)) for _ in range(2))
 
 
-def ask(board, said, seconds=0.0, **environment):
-    """What the board answers; the line is kept open for some seconds after the last byte."""
+def ask(board, said, until=lambda: True, **environment):
+    """What the board answers; the line is kept open until something is so."""
     process = subprocess.Popen([board], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
     process.stdin.write(said)
     process.stdin.flush()
-    time.sleep(seconds)
-    return process.communicate(timeout=30)[0]
+    end = time.monotonic() + LIMIT_S
+    while not until() and time.monotonic() < end:
+        time.sleep(0.01)
+    return process.communicate(timeout=LIMIT_S)[0]
 
 
 class Template(unittest.TestCase):
@@ -30,9 +33,9 @@ class Template(unittest.TestCase):
 
     def test_memory_outlives_the_process(self):
         with tempfile.TemporaryDirectory() as temporary:
-            memory = str(Path(temporary, "memory"))
+            memory = Path(temporary, "memory")
             there = b"\x10\0\0\0\x20\0\0\0\x30\0\0\0"
-            self.assertEqual(ask(TRIO, b"S\x0f" + there, 1.6, STRAPS="8", MEMORY=memory), b"\r")
+            self.assertEqual(ask(TRIO, b"S\x0f" + there, lambda: memory.exists() and memory.stat().st_size > 0, STRAPS="8", MEMORY=memory), b"\r")
             self.assertEqual(ask(TRIO, b"c", STRAPS="8", MEMORY=memory), there + b"\x1e\r")
 
 
