@@ -95,11 +95,16 @@ static bool is_between_bytes(const dr_guard *g)
            (g->task != TASK_PASS || g->reply_have == 0);
 }
 
-static void end(dr_guard *g, dr_us now)
+static void settle(dr_guard *g, dr_us now)
 {
     if (g->torn && g->device_present) /* found now: to the guard it is as unplugged */
         dr_g_link(g, now, g->host_open, g->plugged);
     dr_g_show_state(g, now);
+}
+
+static void end(dr_guard *g, dr_us now)
+{
+    settle(g, now);
     if (g->stops_out == 0 && is_between_bytes(g)) /* nor while a ^C waits to be pulled */
         dr_g_seal(g);
 }
@@ -154,7 +159,8 @@ static void frame_sent(dr_guard *g, dr_us now)
 size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room)
 {
     size_t count = 0;
-    if (g->stops_out == 0 && g->out_at == g->out_ready && !is_due(g, now)) /* asked often; mostly there is nothing */
+    const bool is_idle = g->stops_out == 0 && g->out_at == g->out_ready && !is_due(g, now);
+    if (g->sealed && is_idle) /* asked often; mostly there is nothing */
         return 0;
     begin(g, now);
     while (count < room) { /* at most room times */
@@ -173,7 +179,10 @@ size_t dr_guard_pull_device(dr_guard *g, dr_us now, uint8_t *bytes, size_t room)
             break;
         }
     }
-    end(g, now);
+    if (is_idle)
+        end(g, now);
+    else
+        settle(g, now); /* what was pulled goes to its line first, and a stop may be near: the next call seals */
     return count;
 }
 

@@ -195,6 +195,7 @@ static bool from_guard_to_device(void)
     rig.to_device_busy = true;
     rig.to_device_byte = byte;
     rig.to_device_at = rig.now + rig.byte_us;
+    (void)dr_guard_pull_device(&rig.guard, clock_now(), &byte, 0); /* now it has the time to seal */
     return true;
 }
 
