@@ -148,11 +148,22 @@ def planted(plant, directory):
     return directory
 
 
+def with_included(paths):
+    """The files, and those of ours that they include."""
+    found, left = set(), list(paths)
+    while left:
+        path = left.pop()
+        if path not in found:
+            found.add(path)
+            names = re.findall(r'^#include "(.+)"', path.read_text(), re.M)
+            left += [at / name for name in names for at in (HERE, CORE) if (at / name).is_file()]
+    return sorted(found)
+
+
 def fingerprint(proof):
     text = hashlib.sha256(repr(vars(proof)).encode())
-    for path in [*sorted(CORE.glob('*.[ch]')), HERE / 'proof.h', HERE / proof.file]:
-        if path.suffix == '.h' or path.name in proof.sources or path.parent == HERE or path.name in (HERE / proof.file).read_text():
-            text.update(path.read_bytes())
+    for path in with_included([HERE / proof.file, *(CORE / source for source in proof.sources)]):
+        text.update(path.read_bytes())
     return text.hexdigest()
 
 
