@@ -266,13 +266,14 @@ class Bench:
         return True
 
     def fate(self, module, name, function, text, first=''):
-        """first: the program that killed it when it was tried before."""
+        """first: the program that killed it when it was tried before, which most likely does so again."""
         function = function.split(' ')[0]
-        for compiler, flags, least, most in ((TCC, [], 0, SWIFT), ('gcc', QUICK, SWIFT, LONG if self.is_quick else 1000)):
+        tries = [(TCC, [], 0, SWIFT, None), ('gcc', QUICK, SWIFT, LONG if self.is_quick else 1000, None)]
+        for compiler, flags, least, most, only in [(TCC, [], 0, LONG, first)] * bool(first) + tries:
             if not self.libraries(module, name, text, 'quick', compiler, flags):
                 return 'stillborn', ''
-            plan = self.plan(module, function, 'quick', least, most)
-            fate, by = self.verdict(sorted(plan, key=lambda step: step[1] != first), 'quick')
+            plan = [step for step in self.plan(module, function, 'quick', least, most) if only in (None, step[1])]
+            fate, by = self.verdict(plan, 'quick')
             if fate != 'survived':
                 return fate, by
         if self.is_identical(name, text):

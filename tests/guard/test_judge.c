@@ -772,6 +772,9 @@ static void the_window_of_a_knob_is_rounded_up(void)
     limits.knob_q_per_s = 101;
     TEST_ASSERT_EQUAL(6, dr_judge_margin_q(&limits, &scene, &line));
     TEST_ASSERT_EQUAL(2, dr_judge_margin_q(&limits, &scene, &move));
+    scene.waited_us = 11; /* 10,011 us at 99,091 quanta/s: 992 and a millionth */
+    limits.knob_q_per_s = 99091;
+    TEST_ASSERT_EQUAL(993, dr_judge_margin_q(&limits, &scene, &move));
 }
 
 static void every_obstacle_counts_and_none_beyond_the_count(void)
