@@ -18,7 +18,7 @@ MARGIN_STACK_SEEN = 1.2  # an interrupt comes at the deepest call, or not
 KINDS = ("trio", "mpc")
 WITH_HANDS = ("trio", "mpc", "trio-hands", "mpc-hands")
 IMAGES = [("avr-uno", "uno", "atmega328p", WITH_HANDS), ("avr-mega", "mega", "atmega2560", WITH_HANDS),
-          ("avr-leonardo", "leonardo", "atmega32u4", KINDS), ("cortex-m", "cortex-m", None, KINDS),
+          ("avr-leonardo", "leonardo", "atmega32u4", WITH_HANDS), ("cortex-m", "cortex-m", None, KINDS),
           ("cortex-m0plus", "cortex-m", None, KINDS)]
 # Everything that nests deeply: calibration, a move, a stream, a stop, a calibration of an MPC-200, memory. By hand: a home,
 # a pause of it or a stop, a detent of knob X, one along the diagonal.
@@ -37,7 +37,8 @@ SCENARIO = {
 }
 # Buttons 1, 3, 4, 5 and the contacts of knob Z by the pins of the chip: tests/boards/test_avr_hands.py.
 PINS = {"uno": {"HOME": "D6", "THIRD": "B0", "FOURTH": "B1", "FIFTH": "B2", "A": "C4", "B": "C5"},
-        "mega": {"HOME": "H3", "THIRD": "H5", "FOURTH": "H6", "FIFTH": "B4", "A": "F4", "B": "F5"}}
+        "mega": {"HOME": "H3", "THIRD": "H5", "FOURTH": "H6", "FIFTH": "B4", "A": "F4", "B": "F5"},
+        "leonardo": {"HOME": "D7", "THIRD": "B4", "FOURTH": "B5", "FIFTH": "B6", "A": "F1", "B": "F0"}}
 
 
 def scenario(kind, board):

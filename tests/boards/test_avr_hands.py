@@ -1,7 +1,7 @@
 """Buttons and knobs of AVR boards: the images as they are flashed, in a simulator of the chip, with pins connected to ground
 and left open again in the chip's own time, contacts that bounce included.
 
-    test_avr_hands.py AVR_BOARD IMAGES uno|mega    (IMAGES: the directory of the board's build)
+    test_avr_hands.py AVR_BOARD IMAGES uno|mega|leonardo    (IMAGES: the directory of the board's build)
 
 What is expected is typed from the manuals' first pages and PROTOCOL.md; pins are those of docs/boards.md. In microseconds from
 the board's start.
@@ -15,13 +15,16 @@ import images
 from images import between, point
 
 RUNNER, IMAGES, BOARD = (sys.argv.pop(1) for _ in range(3))
-MCU = {"uno": "atmega328p", "mega": "atmega2560"}[BOARD]
+MCU = {"uno": "atmega328p", "mega": "atmega2560", "leonardo": "atmega32u4"}[BOARD]
+USB = ["--usb"] if BOARD == "leonardo" else []
 # Arduino's pins as pins of the chip (the boards' circuit diagrams).
 PINS = {
     "uno": {"D6": "D6", "D7": "D7", "D8": "B0", "D9": "B1", "D10": "B2", "D11": "B3", "A0": "C0", "A1": "C1", "A2": "C2",
             "A3": "C3", "A4": "C4", "A5": "C5", "D12": "B4", "D13": "B5"},
     "mega": {"D6": "H3", "D7": "H4", "D8": "H5", "D9": "H6", "D10": "B4", "D11": "B5", "A0": "F0", "A1": "F1", "A2": "F2",
              "A3": "F3", "A4": "F4", "A5": "F5", "A8": "K0", "A9": "K1", "A10": "K2", "A11": "K3", "D12": "B6", "D13": "B7"},
+    "leonardo": {"D6": "D7", "D7": "E6", "D8": "B4", "D9": "B5", "D10": "B6", "D11": "B7", "A0": "F7", "A1": "F6", "A2": "F5",
+                 "A3": "F4", "A4": "F1", "A5": "F0", "D12": "D6", "D13": "C7"},
 }[BOARD]
 HOME, WORK, PULSE, RELATIVE, SPEED, MAINS = "D6", "D7", "D8", "D9", "D10", "D11"
 STOP, DIAGONAL, CALIBRATE, MANIPULATOR = "D8", "D9", "D10", "D11"
@@ -61,7 +64,7 @@ def turn(us, knob, detents, quarter_us=4 * MS):
 
 def run(controller, events, memory=None, pins=None):
     events = sorted(events, key=lambda event: event[0])
-    options = [*(["--memory", memory] if memory else []), "--watch", PINS[BUZZER] + PINS[LED], "--script", "-"]
+    options = [*USB, *(["--memory", memory] if memory else []), "--watch", PINS[BUZZER] + PINS[LED], "--script", "-"]
     return images.run([RUNNER, *options, MCU, str(Path(IMAGES, f"{BOARD}-{controller}-hands.elf"))], events, pins)
 
 
@@ -145,7 +148,7 @@ class Trio(unittest.TestCase):
             answers = ask("trio", [], [(at, b"w"), (at + 300 * MS, b"c")], memory)
         self.assertEqual(answers, [b"\r", point(10667 + 640, 10667, 10667) + b"\x1e\r"])
 
-    @unittest.skipIf(BOARD == "uno", "no pins for it")
+    @unittest.skipIf(BOARD != "mega", "no pins for it")
     def test_knob_d_sets_the_angle_after_pulse_was_held(self):
         at = READY_US
         answer, = ask("trio", press(at, PULSE, 3_050 * MS) + turn(at + 3_200 * MS, D, 15), [(at + 3_600 * MS, b"c")])
@@ -191,7 +194,7 @@ class Mpc(unittest.TestCase):
         self.assertTrue(0 < z < x, (x, z))  # 29 degrees: less steep than 45
         self.assertEqual([level for us, pin, level in pins if pin == PINS[LED] and us > at], [1])
 
-    @unittest.skipIf(BOARD == "uno", "no pins for it")
+    @unittest.skipIf(BOARD != "mega", "no pins for it")
     def test_mode_and_manipulator_by_encoder(self):
         at = READY_US
         events = turn(at, MODE, 1) + turn(at + 100 * MS, X, 1) + turn(at + 200 * MS, MANIPULATOR_KNOB, 1)
