@@ -41,7 +41,11 @@ def rig(text, **changes):
 
 def run(*args):
     """Runs the program to its end: (exit status, stdout, stderr)."""
-    done = subprocess.run([PROGRAM, *args], stdin=subprocess.DEVNULL, capture_output=True, timeout=emu.LIMIT_S)
+    with emu.directory() as locks:
+        done = subprocess.run([PROGRAM, *args], stdin=subprocess.DEVNULL, capture_output=True, timeout=emu.LIMIT_S,
+                              env={**os.environ, "DRYRIG_LOCK_DIR": locks})
+        if os.listdir(locks):
+            raise AssertionError(f"left behind: {os.listdir(locks)}")
     return done.returncode, done.stdout.decode(), done.stderr.decode()
 
 

@@ -134,7 +134,7 @@ class Failing(realtime.TestCase):
                 done = subprocess.run([guard.PROGRAM, "--port", "later", "--config", conf], capture_output=True, check=False, cwd=other,
                                       env={**os.environ, "DRYRIG_LOCK_DIR": other}, timeout=emu.LIMIT_S)
                 self.assertEqual((done.returncode, done.stdout), (1, b""))
-                self.assertIn("later is in use by another guard", done.stderr.decode())
+                self.assertIn(f"{other}/later is in use by another guard\n", done.stderr.decode())
 
     def test_a_stdout_that_is_full(self):
         with emu.directory() as directory, emu.Emulator("mpc") as e, open("/dev/full", "wb") as full:
@@ -365,6 +365,83 @@ class Killed(realtime.TestCase):
         self.nothing_moves()
         emu.wait_until(lambda: self.mark() == "0", "the mark to go")
         self.guard.arm()
+
+    def test_the_guard_within_a_frame_is_known_by_every_name_of_its_port(self):
+        """As /dev/serial/by-id/... is a link to /dev/ttyUSB0, and to /dev/ttyUSB1 when it was plugged in again. A name that only
+        the guard before knew wants its own 'confirm': it may be another controller's by now."""
+        os.mkdir(self.directory + "/by-id")
+        names = {name: f"{self.directory}/{name}" for name in ("ttyUSB0", "ttyUSB1", "by-id/converter")}
+
+        def plug(number):
+            for name in names.values():
+                if os.path.islink(name):
+                    os.unlink(name)
+            if number is not None:
+                os.symlink(self.emulator.path, names[f"ttyUSB{number}"])
+                os.symlink(f"../ttyUSB{number}", names["by-id/converter"])
+
+        def starts(name, state, fault):
+            self.guard.args[self.guard.args.index("--port") + 1] = names[name]
+            self.guard.start(state)
+            self.assertEqual(self.guard.status()["fault"], fault)
+
+        def is_killed_within_a_frame():
+            self.kill_host()
+            self.start_host()
+            self.guard.arm()
+            self.host.stdin.write(line(0, 2000, 0, 0))
+            self.host.stdin.flush()
+            self.guard.wait_for("moving")
+            self.guard.kill()
+
+        def is_mended(number=0):
+            self.emulator.stop(signal.SIGKILL)
+            self.guard.wait_for("locked")
+            self.restart_device()
+            plug(number)
+            emu.wait_until(lambda: "device_says" not in self.guard.status(), "the port")
+            self.guard.order("confirm")
+            self.guard.wait_for("disarmed")
+            self.guard.stop()
+
+        def marks():
+            return {name: content for name in names for content in self.marks(name.replace("/", "."))}
+
+        self.guard.stop()
+        plug(0)
+        by_id, device = "by-id/converter", "ttyUSB0"
+        for killed_as, started_as, number, left in ((by_id, device, 0, {by_id: "1"}), (device, by_id, 0, {}), (by_id, by_id, 1, {device: "1"})):
+            starts(killed_as, "disarmed", "none")
+            is_killed_within_a_frame()
+            plug(number)
+            starts(started_as, "locked", "torn-frame")
+            is_mended(number)
+            self.assertEqual(marks(), left)
+            plug(0)
+            for name in left:
+                starts(name, "locked", "torn-frame")
+                is_mended()
+            self.assertEqual(marks(), {})
+
+        starts(device, "disarmed", "none")  # a guard that was started before there was anything to be known of
+        is_killed_within_a_frame()
+        plug(None)
+        starts(by_id, "locked", "no-device")
+        plug(0)
+        emu.wait_until(lambda: "whose last guard was killed within a command" in self.guard.status().get("device_says", ""), "the words")
+        self.assertEqual(self.guard.status()["fault"], "no-device")
+        self.assertEqual(self.guard.err().count("whose last guard was killed within a command"), 1)
+        self.guard.stop()
+        starts(by_id, "locked", "torn-frame")
+        is_mended()
+        self.assertEqual(marks(), {})
+
+    def marks(self, port):
+        """What is noted of a port."""
+        path = f"{self.directory}/dryrig-guard{self.directory.replace('/', '.')}.{port}"
+        if os.path.exists(path):
+            with open(path, encoding="ascii") as file:
+                yield file.read()
 
     def mark(self):
         name, = (name for name in os.listdir(self.directory) if name.startswith("dryrig-guard."))

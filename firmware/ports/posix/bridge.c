@@ -138,7 +138,7 @@ static void set_mark(bridge *b, bool on)
     if (mark_set(&b->mark, on) || b->mark_lost)
         return;
     b->mark_lost = true;
-    say("dryrig-guard: %s cannot be written: %s\n", b->mark.path, strerror(errno));
+    say("dryrig-guard: %s cannot be written: %s\n", b->mark.given.path, strerror(errno));
 }
 
 /* What is to be known after a kill. Half a frame may be in the controller: this guard has sent one, or was told so; or an
@@ -241,9 +241,18 @@ static int try_device(bridge *b)
 {
     const int result = device_open(&b->device, &b->rig.limits, b->device_says, sizeof b->device_says);
     b->next_try_us = b->now_us + TRY_AGAIN_US;
-    if (result == DRYRIG_OK)
-        b->device_says[0] = '\0';
-    return result;
+    if (result != DRYRIG_OK)
+        return result;
+    if (!mark_follow(&b->mark, b->options->port, b->device_says, sizeof b->device_says)) {
+        device_close(&b->device);
+        if (!b->other_said)
+            say("dryrig-guard: %s\n", b->device_says);
+        b->other_said = true;
+        return DRYRIG_ERR_NO_PORT;
+    }
+    b->other_said = false;
+    b->device_says[0] = '\0';
+    return DRYRIG_OK;
 }
 
 /* -- The loop ---------------------------------------------------------------------------------------------------------- */
@@ -455,13 +464,13 @@ int bridge_run(bridge *b, const bridge_options *options)
     (void)prctl(PR_SET_TIMERSLACK, 1ul, 0ul, 0ul, 0ul); /* the usual slack is 50 us, half a byte time */
 
     /* A port that is not there yet is waited for; one that is somebody else's, or no port, is an error now. */
-    const int result = try_device(b);
-    if (result != DRYRIG_OK && result != DRYRIG_ERR_NO_PORT)
-        return fail("--port", b->device_says);
     char why[RIG_WHY_MAX];
-    if (!mark_open(&b->mark, options->port, why, sizeof why)) {
-        device_close(&b->device);
+    if (!mark_open(&b->mark, options->port, why, sizeof why))
         return fail("--port", why);
+    const int result = try_device(b);
+    if (result != DRYRIG_OK && result != DRYRIG_ERR_NO_PORT) {
+        mark_close(&b->mark);
+        return fail("--port", b->device_says);
     }
     const char *const wrong = pty_open(&b->host, b->inotify);
     const int status = wrong != NULL ? fail(wrong, strerror(errno)) : open_rest(b);

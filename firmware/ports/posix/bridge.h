@@ -46,6 +46,7 @@ typedef struct {
     uint64_t next_check_us;        /* of memory, while not disarmed */
     uint64_t mark_due_us;          /* to look whether the line has sent a frame's last byte; 0: not now */
     char device_says[RIG_WHY_MAX]; /* why the device is not there */
+    bool other_said;               /* that it is one that must not be used */
     int inotify, signals;
     bool log_said;
 
