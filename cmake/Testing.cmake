@@ -4,8 +4,8 @@ include(Unity)
 # Python of the system, where scripts/setup puts the modules; not one of a version manager or of a virtual environment.
 find_program(DRYRIG_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
 
-# A sanitizer's report ends the test, with a stack.
-set(DRYRIG_TEST_ENVIRONMENT
+# A sanitizer's report ends the test, with a stack. A socket's path has 107 bytes at most, and the TMPDIR of a CI server more.
+set(DRYRIG_TEST_ENVIRONMENT "TMPDIR=/tmp"
   "ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1" "UBSAN_OPTIONS=print_stacktrace=1")
 
 # dr_test(NAME SOURCES FILE... [LIBS TARGET...] [ARGS ARG...] [LABELS LABEL...] [TIMEOUT SECONDS])
