@@ -230,6 +230,22 @@ class Stopping(realtime.TestCase):
             g.stop() # which does not wait for the second
             self.assertEqual(self.refusals_told(g), 7)
 
+    def test_who_was_never_there_has_not_closed_the_port(self):
+        with emu.directory() as directory, emu.Emulator("mpc", *FAST) as e, Guard(directory, e.path, rig(guard.MPC)) as g:
+            g.arm()
+            g.order("stop")
+            while g.status()["state"] == "stopping": # somebody else's terminals come and go
+                for fd in os.openpty():
+                    os.close(fd)
+            self.assertEqual(g.order("clear")["state"], "disarmed")
+            self.assertNotIn("disarmed_says", g.status())
+
+    def test_calibration_is_not_announced_where_the_configuration_forbids_it(self):
+        with emu.directory() as directory, emu.Emulator("trio", *FAST) as e, Guard(directory, e.path, rig(guard.TRIO)) as g:
+            answer = g.order("allow-calibrate")
+            self.assertEqual((answer["ok"], answer["may_calibrate"]), (False, False))
+            self.assertIn("has no 'allow_calibrate = true'", answer["why"])
+
     @staticmethod
     def refusals_told(g):
         return g.err().count("refused 'move'") + sum(int(n) for n in re.findall(r"and (\d+) more refused", g.err()))

@@ -191,6 +191,7 @@ static void read_hints(bridge *b)
 {
     char hints[1024];
     ssize_t length;
+    const bool was_open = b->host.opens > 0;
     while ((length = read(b->inotify, hints, sizeof hints)) > 0) {
         struct inotify_event hint;
         for (const char *at = hints; at < hints + length; at += sizeof hint + hint.len) {
@@ -204,7 +205,7 @@ static void read_hints(bridge *b)
         bridge_pump(b);
     }
     pty_look(&b->host);
-    b->host_left = b->host_left || b->host.was_left || b->host.opens == 0;
+    b->host_left = b->host_left || b->host.was_left || (was_open && b->host.opens == 0);
     tell_link(b);
 }
 

@@ -365,6 +365,7 @@ void orders_take(void *context, control_client *who, const char *line)
 {
     bridge *const b = context;
     unsigned count;
+    const bool calibrates = (b->rig.limits.rig & DR_RIG_MAY_CALIBRATE) != 0;
     if (who->waits) { /* one after the other */
         control_say(who, "{\"ok\":false,\"why\":\"the last order has no answer yet\"}");
     } else if (is(line, "arm")) {
@@ -376,6 +377,8 @@ void orders_take(void *context, control_client *who, const char *line)
         answer_status(b, who, NULL);
     } else if (is_log(line, &count)) {
         answer_log(b, who, count);
+    } else if (is(line, "allow-calibrate") && !calibrates) {
+        answer_status(b, who, "the configuration has no 'allow_calibrate = true': no calibration passes");
     } else if (set_at_once(b, line)) {
         answer_status(b, who, NULL);
     } else {
