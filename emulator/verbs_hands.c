@@ -47,24 +47,35 @@ static const control_name banks[] = {{"rear", TRIO | MPC, DR_SWITCHES_REAR},
 static instrument *ins_of(const telling *t) { return &t->s->ins; }
 static dr_kind kind_of(const telling *t) { return (dr_kind)t->s->ins.controller.kind; }
 
+/* The control of this controller that a word names; NULL: none. */
+static const control_name *find_control(const telling *t, const control_name *names, const char *word)
+{
+    for (const control_name *n = names; word != NULL && n->name != NULL; n++)
+        if ((n->kinds & BIT(kind_of(t))) != 0 && strcasecmp(word, n->name) == 0)
+            return n;
+    return NULL;
+}
+
 /* The next word as a control of this controller. */
 static bool read_control(telling *t, const control_name *names, int *control, const char **name)
 {
     const char *const word = telling_next(t);
+    const control_name *const found = find_control(t, names, word);
+    if (found != NULL) {
+        *control = found->control;
+        *name = found->name;
+        return true;
+    }
     char why[WHY_ROOM] = "expected one of ";
     const size_t begun = strlen(why);
     size_t length = begun;
-    for (const control_name *n = names; n->name != NULL; n++) {
-        if ((n->kinds & BIT(kind_of(t))) == 0)
-            continue;
-        if (word != NULL && strcasecmp(word, n->name) == 0) {
-            *control = n->control;
-            *name = n->name;
-            return true;
-        }
-        if (length < sizeof why)
+    for (const control_name *n = names; n->name != NULL; n++)
+        if ((n->kinds & BIT(kind_of(t))) != 0 && length < sizeof why)
             length += (size_t)snprintf(why + length, sizeof why - length, "%s%s", length > begun ? ", " : "", n->name);
-    }
+    if (names == buttons && find_control(t, knobs, word) != NULL && length < sizeof why)
+        (void)snprintf(why + length, sizeof why - length, "; it is turned: knob %s +1", word);
+    if (names == knobs && find_control(t, buttons, word) != NULL && length < sizeof why)
+        (void)snprintf(why + length, sizeof why - length, "; it is pressed: press %s", word);
     return telling_about(t, word, why);
 }
 

@@ -146,6 +146,9 @@ class Buttons(unittest.TestCase):
             self.assertIn("expected one of home, work, pulse", e.refuses("release stop"))
             self.assertIn("one word too many", e.refuses("release home now"))
             self.assertIn("expected one of x, y, z, d", e.refuses("knob q 1"))
+            self.assertIn("x, y, z, d; it is pressed: press home", e.refuses("knob home 1"))
+            self.assertIn("angle, lock; it is turned: knob x +1", e.refuses("hold x 1s"))
+            self.assertNotIn("it is", e.refuses("press manipulator"))  # it has none
             self.assertIn("whole number", e.refuses("knob x"))
             self.assertIn("whole number", e.refuses("knob x 1.5"))
             self.assertIn("from 1 to 6", e.refuses("switch rear 7 on"))
