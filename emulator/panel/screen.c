@@ -403,7 +403,10 @@ void screen_draw(const screen_view *v)
         draw_help(m);
     } else if (!m->is_known || !m->is_shown) {
         put(0, 0, COLS, " waiting for the emulator ... (q quits)");
-        draw_last_line(v);
+        if (v->silent_s > 0)
+            put(2, 0, COLS, " It has not answered for %u s: it is stopped, or at work.", v->silent_s);
+        else
+            draw_last_line(v);
     } else {
         const int views = VIEWS_MIN + (LINES - SCREEN_ROWS) / 2;
         draw_title(v);

@@ -421,12 +421,13 @@ class Clock(unittest.TestCase):
             emu.wait_until(lambda: "answer" not in t.rows()[23] and "ANSWER" not in t.rows()[0], "it answers again")
 
     def test_a_panel_of_a_stopped_emulator_ends(self):
-        with trio() as e, Terminal(PANEL, e.socket_path) as t:
-            t.shows("ABSOLUTE")
+        with trio() as e:
             os.kill(e.process.pid, signal.SIGSTOP)
             try:
-                t.keys("q")
-                t.ended(0)
+                with Terminal(PANEL, e.socket_path) as t:
+                    t.shows("waiting for the emulator", "It has not answered for")
+                    t.keys("q")
+                    t.ended(0)
             finally:
                 os.kill(e.process.pid, signal.SIGCONT)
 
