@@ -94,6 +94,13 @@ bool journal_add(journal *j, const rig *r, const dr_record *record, uint64_t wal
     return !j->has_failed;
 }
 
+bool journal_retry(journal *j)
+{
+    if (j->has_failed)
+        j->has_failed = write(j->fd, "\n", 1) != 1;
+    return !j->has_failed;
+}
+
 const journal_entry *journal_last(const journal *j, uint64_t n)
 {
     return n < j->count && n < JOURNAL_KEPT ? &j->kept[(j->count - 1u - n) % JOURNAL_KEPT] : NULL;

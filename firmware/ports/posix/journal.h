@@ -33,6 +33,8 @@ bool journal_open(journal *j, const char *path);
 void journal_close(journal *j);
 /* False, from then on: the file cannot be written (errno says why); tries again at the next record. */
 bool journal_add(journal *j, const rig *r, const dr_record *record, uint64_t wall_us);
+/* After a failure: is there room again? As above; an empty line is nothing to its readers. */
+bool journal_retry(journal *j);
 /* The n-th last entry, from 0. NULL: there is none. */
 const journal_entry *journal_last(const journal *j, uint64_t n);
 

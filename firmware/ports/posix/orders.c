@@ -266,7 +266,7 @@ static void watch_arming(bridge *b)
     if (b->was_armed && b->host_left && status.state != DR_GUARD_IDLE)
         b->disarmed_says = "the host's program has closed the port";
     if (b->was_armed && status.state == DR_GUARD_DISARMED && b->disarmed_says == NULL)
-        b->disarmed_says = b->log_said ? "the log cannot be written" : "nothing was moved for a while (arm_idle_s)";
+        b->disarmed_says = b->log_said ? "the log could not be written" : "nothing was moved for a while (arm_idle_s)";
     if (b->was_armed && !is_armed && status.escape)
         set_input(b, DR_INPUT_ESCAPE, false);
     b->was_armed = is_armed;
@@ -310,6 +310,8 @@ bool orders_due(const bridge *b, uint64_t *when_us)
 
 static void order_arm(bridge *b, control_client *who)
 {
+    if (journal_retry(&b->journal)) /* somebody has made room */
+        bridge_pump(b);
     if (has_surface(b) && !b->surface_said)
         answer_status(b, who, "say first whether the tip is in tissue: 'surface on' or 'surface off'");
     else
