@@ -162,13 +162,17 @@ static void flush_all(engine *e)
             flush(e, &e->stations[i]);
 }
 
-/* Who has opened and closed ports. */
-static void read_hints(engine *e)
+static void take_in(engine *e, station *s)
+{
+    e->now_ns = real_ns(); /* not before it was written: pauses never look shorter for that */
+    station_take(s, e->now_ns);
+    run_station(e, s, e->now_us);
+}
+
+static void collect_hints(engine *e)
 {
     char hints[4096];
     ssize_t length;
-    for (unsigned i = 0; i < e->station_count; i++)
-        e->stations[i].was_open = e->stations[i].port.opens > 0;
     while ((length = read(e->inotify, hints, sizeof hints)) > 0) {
         struct inotify_event hint;
         for (const char *at = hints; at < hints + length; at += sizeof hint + hint.len) {
@@ -178,6 +182,25 @@ static void read_hints(engine *e)
                     pty_hint(&e->stations[i].port, hint.mask);
         }
     }
+}
+
+/* Who has left the port has written before. What is there now is its own, where nobody has opened the port since: what a next
+ * one has written comes when the port has been looked at. */
+static void hear_out(engine *e, station *s)
+{
+    while (s->was_open && s->port.opens == 0 && (s->chunk_count > 0 || station_read(s))) {
+        collect_hints(e);
+        if (s->port.opens == 0)
+            take_in(e, s);
+    }
+}
+
+/* Who has opened and closed ports. */
+static void read_hints(engine *e)
+{
+    collect_hints(e);
+    for (unsigned i = 0; i < e->station_count; i++)
+        hear_out(e, &e->stations[i]);
     for (unsigned i = 0; i < e->station_count; i++) {
         station_look(&e->stations[i]);
         if (e->waits_for_client && e->stations[i].port.opens > 0) {
@@ -185,6 +208,9 @@ static void read_hints(engine *e)
             e->epoch_ns = e->now_ns;
         }
     }
+    for (unsigned i = 0; i < e->station_count; i++)
+        if (e->stations[i].chunk_count > 0)
+            take_in(e, &e->stations[i]);
 }
 
 /* Takes what a host has sent, as far as the line has room. */
@@ -193,9 +219,6 @@ static void listen_to(engine *e, station *s)
     while (station_read(s)) {
         const bool has_more = s->chunk_is_full; /* if not, the kernel will say when it has */
         read_hints(e);                          /* see station_take() */
-        e->now_ns = real_ns();                  /* not before it was written: pauses never look shorter for that */
-        station_take(s, e->now_ns);
-        run_station(e, s, e->now_us);
         if (!has_more)
             return;
     }
@@ -360,11 +383,8 @@ void engine_catch_up(engine *e)
     run_to_now(e);
     read_hints(e);
     for (unsigned i = 0; i < e->station_count; i++)
-        while (station_read(&e->stations[i])) { /* until a read finds nothing: it has waited for what was on its way */
+        while (station_read(&e->stations[i])) /* until a read finds nothing: it has waited for what was on its way */
             read_hints(e);
-            station_take(&e->stations[i], e->now_ns);
-            run_station(e, &e->stations[i], e->now_us);
-        }
     flush_all(e); /* what is answered next comes behind what the host was sent */
 }
 

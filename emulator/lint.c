@@ -450,6 +450,7 @@ static void command_written(lint *l, lint_station *s, const observation *seen, c
     s->is_excused = false;
     s->command_ns = seen->real_ns;
     s->reply_ns = 0;
+    s->lost_reply = false;
 }
 
 /* -- Bytes that are no command ----------------------------------------------------------------------------------------- */
@@ -579,7 +580,7 @@ static void port_left(lint *l, lint_station *s, const observation *seen)
     else if (seen->unread > 0)
         find(l, s, seen, LINT_UNREAD_REPLY, NULL, 0, "the port was closed with %lu byte%s unread, after %s",
              (unsigned long)seen->unread, seen->unread == 1 ? "" : "s", before);
-    else if (is_owed(s))
+    else if (is_owed(s) || s->lost_reply)
         find(l, s, seen, LINT_UNREAD_REPLY, NULL, 0, "the port was closed before %s was answered", before);
 }
 
@@ -648,6 +649,8 @@ static void see(observer *o, const observation *seen)
         s->is_excused = true;
         break;
     case OBSERVED_LOST:
+        s->lost_reply = true;
+        break;
     case OBSERVED_EVENT:
         break;
     }

@@ -89,6 +89,7 @@ typedef struct {
     dr_op last;          /* the last command */
     unsigned in_flight;  /* commands that are on the line to the controller */
     bool reply_is_leaving;
+    bool lost_reply;     /* to the last command, or a part of it: it could not be put into the port */
     bool said_streaming; /* 'F' or 'O' since the port was opened or the power came on */
     bool told_streaming; /* rule 14 once for each such time */
     bool is_excused;     /* a fault has struck since the last command */

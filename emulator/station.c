@@ -105,7 +105,7 @@ bool station_plug(station *s, int inotify_fd, char *why, size_t room)
         return false;
     }
     s->tty = s->port.raw;
-    s->baud = tty_baud(s->port.host_fd);
+    s->baud = s->raw_baud = tty_baud(s->port.host_fd);
     if (s->link != NULL && (s->link_lock = link_make(s->link, s->port.path, why, room)) < 0) {
         (void)inotify_rm_watch(inotify_fd, s->port.watch);
         pty_close(&s->port);
@@ -129,7 +129,8 @@ void station_unplug(station *s, int inotify_fd)
     pty_close(&s->port);
     s->port.opens = 0;
     s->port.waiting_count = 0;
-    s->is_plugged = s->has_unread = s->wants_write = false;
+    s->chunk_count = 0;
+    s->is_plugged = s->was_open = s->has_unread = s->wants_write = false;
 }
 
 void station_start(station *s, uint64_t now_us, uint64_t now_ns)
@@ -239,6 +240,7 @@ void station_take(station *s, uint64_t now_ns)
         observe(s->observers, &seen);
     }
     (void)instrument_take(&s->ins, pause, s->chunk, s->chunk_count);
+    s->chunk_count = 0;
 }
 
 /* First what is to be done, then telling: who is told acts on it. */
@@ -254,11 +256,14 @@ void station_look(station *s)
     left.text = "nobody has the port open any more";
     if (s->was_open && was_left)
         observe(s->observers, &left);
-    if (s->port.opens > 0 && (!s->was_open || was_left)) {
+    if (was_left || !s->was_open) { /* as it is made raw for the next one */
         s->tty = s->port.raw;
-        s->baud = tty_baud(s->port.host_fd);
-        station_say(s, OBSERVED_OPENED, "the port has been opened");
+        s->baud = s->raw_baud;
     }
+    const bool was_open = s->was_open && !was_left;
+    s->was_open = s->port.opens > 0;
+    if (s->was_open && !was_open)
+        station_say(s, OBSERVED_OPENED, "the port has been opened");
 }
 
 bool station_flush(station *s) { return !s->is_plugged || pty_flush(&s->port); }

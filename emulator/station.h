@@ -28,7 +28,7 @@ struct station {
     bool is_plugged;             /* it has a port; false while its USB plug is out */
     uint64_t plug_at_us;         /* it is put in again then, by whoever runs the station; 0: not by itself */
     int link_lock;               /* -1: no link */
-    bool was_open;               /* see station_look() */
+    bool was_open;               /* when station_look() last looked */
     bool has_unread;             /* the kernel holds bytes that the line had no room for */
     bool wants_write;            /* waits for the host to read */
     bool told_loss;
@@ -41,10 +41,11 @@ struct station {
     uint32_t missed;    /* notes that did not fit the ring, told so far */
     struct termios tty; /* how the host had set the port when its last bytes came */
     uint32_t baud;
+    uint32_t raw_baud;                  /* of a port that nobody has open */
     uint32_t unread;                    /* by the host, when its last bytes came */
     uint8_t chunk[INSTRUMENT_LINE_MAX]; /* between station_read() and station_take() */
-    size_t chunk_count;
-    bool chunk_is_full; /* there may be more */
+    size_t chunk_count;                 /* 0: taken */
+    bool chunk_is_full;                 /* there may be more */
     dr_notes notes;
     dr_note ring[STATION_NOTES];
 };
@@ -61,10 +62,10 @@ void station_start(station *s, uint64_t now_us, uint64_t now_ns);
 bool station_run(station *s, uint64_t now_us, uint64_t now_ns);
 /* Reads what the host has sent, as far as the line has room. False: nothing now. */
 bool station_read(station *s);
-/* Takes it; station_run() comes next. Between the two comes station_look(): who has opened or closed the port has done so before the bytes
- * that are there now, and what is on its way to a host that has gone must not meet the answer to the next. */
+/* Takes it; station_run() comes next. Between the two comes station_look(), but where all of it is from one that has left: what is
+ * on its way to a host that has gone must not meet the answer to the next. */
 void station_take(station *s, uint64_t now_ns);
-/* Somebody may have opened or closed the port: pty_hint() has been called, was_open says how it was before. */
+/* Somebody may have opened or closed the port: pty_hint() has been called. */
 void station_look(station *s);
 /* Gives the kernel what the host is to read. True: all of it. */
 bool station_flush(station *s);

@@ -425,6 +425,17 @@ static void closing_before_the_answer_leaves_it(void)
     found(LINT_UNREAD_REPLY, 1);
 }
 
+static void closing_before_an_answer_that_nobody_can_get_leaves_it(void)
+{
+    start(DR_MPC);
+    bench_say(&b, "K", 1);
+    bench_tell(&b, OBSERVED_LOST);
+    bench_read(&b, ALL);
+    bench_tell(&b, OBSERVED_CLOSED);
+    found(LINT_UNREAD_REPLY, 1);
+    TEST_ASSERT_EQUAL_STRING("the port was closed before active was answered", l.findings[0].text);
+}
+
 static void closing_when_all_is_read_leaves_nothing(void)
 {
     start(DR_MPC);
@@ -1014,6 +1025,7 @@ int main(void)
     RUN_TEST(a_cr_that_is_not_read_is_left);
     RUN_TEST(closing_with_an_answer_in_the_port_leaves_it);
     RUN_TEST(closing_before_the_answer_leaves_it);
+    RUN_TEST(closing_before_an_answer_that_nobody_can_get_leaves_it);
     RUN_TEST(closing_when_all_is_read_leaves_nothing);
     RUN_TEST(an_interrupt_may_leave_streamed_positions_unread);
     RUN_TEST(what_follows_a_fault_is_not_judged);

@@ -96,6 +96,16 @@ class Lint(realtime.TestCase):
                 _, _, err = emulator("run", "mpc", "--clock", clock, "--", sys.executable, "-c", program, pause)
                 self.assertEqual(["16 thirteen-bytes, 5 times"], re.findall(r"^\d.*", err, re.MULTILINE), err)
 
+    def test_a_program_that_asks_and_leaves(self):
+        """What it wrote before it left is judged as the program's, whenever one gets to look."""
+        program = ("import os, serial; p = serial.Serial(os.environ['DRYRIG_PORT'], 128000, timeout=5)\n"
+                   "p.write(b'K'); p.read(4); p.write(b'C'); p.close()")
+        for clock in ("real", "jump", "step"):
+            for _ in range(5):
+                _, _, err = emulator("run", "mpc", "--clock", clock, "--", sys.executable, "-c", program)
+                found = re.findall(r"^\d+ (.*), 1 time$", err, re.MULTILINE)
+                self.assertEqual({"unread-reply"}, set(found) - {"hurried-command"}, err)
+
     def test_strict_changes_nothing_but_0(self):
         burst = "exec 3<>$DRYRIG_PORT; printf 'CC' >&3; dd bs=28 count=1 iflag=fullblock <&3 2>&1 >/dev/null; exit "
         for wanted, options in ((0, []), (3, ["--strict"]), (0, ["--lint=off"])):
