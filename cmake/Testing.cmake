@@ -72,7 +72,7 @@ function(dr_fuzz name)
   if(fuzz_CORPUS)
     get_filename_component(corpus "${fuzz_CORPUS}" ABSOLUTE)
   endif()
-  add_test(NAME ${name} COMMAND ${name} -max_total_time=${fuzz_SECONDS} -timeout=10 -print_final_stats=1
+  add_test(NAME ${name} COMMAND ${name} -max_total_time=${fuzz_SECONDS} -timeout=60 -print_final_stats=1
     "-artifact_prefix=${found}/" "${found}" ${corpus})
   math(EXPR timeout "${fuzz_SECONDS} + 600")
   dr_test_properties(${name} LABELS fuzz TIMEOUT ${timeout})
