@@ -240,7 +240,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
         break;
     case ARGP_KEY_ARG:
         if (t->word_count == sizeof t->words / sizeof t->words[0])
-            argp_error(state, "'%s' is one word too many", value);
+            argp_error(state, "'%s' is one word too many%s", value,
+                       strcmp(t->words[0], "run") == 0 ? "; the command of run stands behind --" : "");
         t->words[t->word_count++] = value;
         break;
     default:

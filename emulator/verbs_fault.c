@@ -8,6 +8,8 @@
 
 #define TIMES_MAX 100u
 
+static const char *const axes[DR_AXES] = {"x", "y", "z"};
+
 static faults *faults_of(const telling *t) { return &t->s->ins.faults; }
 
 static bool wrong_name(telling *t, const char *name)
@@ -39,9 +41,8 @@ static bool read_chance(telling *t, uint32_t *millionths)
 
 static bool read_axis(telling *t, uint8_t *axis)
 {
-    static const char *const names[DR_AXES] = {"x", "y", "z"};
     for (*axis = 0; *axis < DR_AXES; (*axis)++)
-        if (telling_take(t, names[*axis]))
+        if (telling_take(t, axes[*axis]))
             return true;
     return telling_about(t, t->words[t->at], "expected an axis: x, y or z");
 }
@@ -164,6 +165,8 @@ static cJSON *rule_json(const fault_rule *r)
 {
     cJSON *const out = cJSON_CreateObject();
     (void)cJSON_AddStringToObject(out, "fault", faults_words((fault_id)r->id)->name);
+    if (faults_words((fault_id)r->id)->takes_axis)
+        (void)cJSON_AddStringToObject(out, "axis", axes[r->axis % DR_AXES]);
     if (r->left != FAULT_ALWAYS)
         (void)cJSON_AddNumberToObject(out, "left", r->left);
     if (r->op != DR_OP_NONE)

@@ -172,6 +172,8 @@ class Faults(unittest.TestCase):
         for _ in range(5):
             self.assertEqual(self.ask(K), ACTIVE[:3])
         self.assertEqual(self.e.do("faults")["active"], [{"fault": "drop-cr", "command": "active"}])
+        self.e.do("fault stall-axis z")
+        self.assertEqual(self.e.do("faults")["active"][1], {"fault": "stall-axis", "axis": "z", "left": 1})
         self.e.do("fault late-cr off")
         self.assertEqual(self.ask(K), ACTIVE[:3])
         self.e.do("fault drop-cr off")

@@ -245,7 +245,7 @@ class Run(emu.InDirectory):
 
     def test_wrong_options(self):
         for args, words in ((["mpc"], "which command"), (["mpc", "--"], "which command"), (["--", "true"], "trio or mpc"),
-                            (["mpc", "trio", "--", "true"], "trio")):
+                            (["mpc", "trio", "--", "true"], "trio"), (["mpc", "sh", "status.sh"], "stands behind --")):
             done = self.run_(*args)
             self.assertEqual(done.returncode, 2, args)
             self.assertIn(words, done.stderr.decode())
