@@ -380,6 +380,25 @@ static void an_answer_is_awaited_2_s_at_a_time_while_the_line_hangs(void)
     TEST_ASSERT_NULL(last_record(DR_EVENT_NO_REPLY));
 }
 
+/* What a knob can do meanwhile the margin grows by; what takes longer is asked for again. */
+static void an_answer_may_come_100_ms_late(void)
+{
+    for (uint32_t took_us = 103000; took_us <= 103001; took_us++) { /* 3 ms are for its bytes */
+        armed();
+        rig.limits.rig = 0;
+        limits_changed();
+        run_us(1000);
+        host_line(15, 48000, 40000, 40000);
+        const uint32_t before = rig.wire_count;
+        run_us(2000);
+        TEST_ASSERT_EQUAL(before + 1, rig.wire_count);
+        run_us(took_us);
+        says_at(40000);
+        run_us(2000);
+        TEST_ASSERT_EQUAL_HEX8(took_us == 103000 ? 'S' : 'c', rig.wire[before + 1]);
+    }
+}
+
 /* The guard's own query comes behind the frame that is half out, and rest is proved once the line goes on. */
 static void a_query_waits_2_ms_at_a_time_while_the_line_hangs(void)
 {
@@ -620,6 +639,7 @@ int main(void)
     RUN_TEST(one_call_does_sixteen_things_that_are_due);
     RUN_TEST(a_flipped_bit_among_the_timers_is_no_timer);
     RUN_TEST(an_answer_is_awaited_2_s_at_a_time_while_the_line_hangs);
+    RUN_TEST(an_answer_may_come_100_ms_late);
     RUN_TEST(a_query_waits_2_ms_at_a_time_while_the_line_hangs);
     RUN_TEST(behind_an_error_of_the_hosts_line_50_ms_are_enough);
     return UNITY_END();

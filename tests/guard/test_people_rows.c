@@ -64,7 +64,7 @@ static void row_59_an_answer_is_as_old_as_its_query(void)
         unsigned after_ms;
         bool knobs_locked;
         char then; /* A: allowed, R: refused, C: asked again */
-    } answers[] = {{1, false, 'A'},  {19, false, 'A'},  {23, false, 'R'}, {40, false, 'R'},
+    } answers[] = {{1, false, 'A'},   {19, false, 'A'},   {23, false, 'R'}, {40, false, 'R'},
                    {104, false, 'C'}, {1500, false, 'C'}, {1500, true, 'A'}};
     for (size_t i = 0; i < sizeof answers / sizeof *answers; i++) {
         bench_trio();

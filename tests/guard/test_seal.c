@@ -40,6 +40,8 @@ static void later(uint64_t us)
 /* 40,000 on each axis, 30 degrees. */
 static const char at_home[] = "\x40\x9C\0\0\x40\x9C\0\0\x40\x9C\0\0\x1E\r";
 static const char line[] = "S\x0F\xE0\xAB\0\0\x40\x9C\0\0\x40\x9C\0\0"; /* to 44,000 on X */
+static const char at_home_mpc[] = "\x01\x80\x38\x01\0\x80\x38\x01\0\x80\x38\x01\0\r";
+static const char line_mpc[] = "S\x0F\x20\x48\x01\0\x80\x38\x01\0\x80\x38\x01\0"; /* to 84,000 on X */
 
 static void started(void)
 {
@@ -269,17 +271,12 @@ static void damage_is_answered_by_one_ctrl_c(void)
     break_seal(false);
 }
 
-static void damage_within_a_frame_is_answered_by_silence(void)
+/* An MPC-200's line, 2 ms behind its query: 'S' and the speed have left. */
+static void mpc_line_has_begun(uint16_t facts)
 {
-    armed();
-    host(line, 14);
-    later(2000);
-    read_at_home(); /* allowed, and waits for its turn: who knows what of it was pulled */
-    break_seal(true);
-    static const char at_home_mpc[] = "\x01\x80\x38\x01\0\x80\x38\x01\0\x80\x38\x01\0\r";
-    static const char line_mpc[] = "S\x0F\x20\x48\x01\0\x80\x38\x01\0\x80\x38\x01\0"; /* to 84,000 on X */
     bench_mpc();
     rig.by_hand = true;
+    rig.limits.rig = facts;
     dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64);
     dr_guard_start(&rig.guard, guard_clock(), DR_START_POWER_ON);
     dr_guard_link(&rig.guard, guard_clock(), true, true);
@@ -299,6 +296,16 @@ static void damage_within_a_frame_is_answered_by_silence(void)
     TEST_ASSERT_TRUE(pull());
     TEST_ASSERT_FALSE(pull()); /* the pause behind 'S' and the speed */
     SEALED();
+}
+
+static void damage_within_a_frame_is_answered_by_silence(void)
+{
+    armed();
+    host(line, 14);
+    later(2000);
+    read_at_home(); /* allowed, and waits for its turn: who knows what of it was pulled */
+    break_seal(true);
+    mpc_line_has_begun(DR_RIG_KNOBS_LOCKED);
     dr_guard_input(&rig.guard, guard_clock(), DR_INPUT_STOP, true); /* waits for the frame */
     expect_state(DR_GUARD_STOPPING);
     rig.guard.stops_out = 0; /* else it is open */
@@ -342,6 +349,50 @@ static void a_motion_leaves_in_time_or_is_read_for_again(void)
             (void)dr_guard_pull_device(&rig.guard, guard_clock(), &byte, 1);
             expect_state(DR_GUARD_CHECKING);
         }
+    }
+}
+
+static void obstacle_beside_the_line(int32_t away_q)
+{
+    const uint8_t item = keep_out(4000, 6000, 5500, 5600, 4000, 6000);
+    rig.limits.obstacles[item].box_q.min_q[DR_Y] = UM(5000) + away_q;
+    limits_changed();
+}
+
+/* Its own bytes take time, for which the margin has room: they are not looked at as if each began the motion. The margin is
+ * 50 um and 5 mm/s for 10 ms, or 50 ms; a microsecond more and the obstacle would be in the way. */
+static void a_frame_that_left_in_time_is_not_late_while_it_leaves(void)
+{
+    armed();
+    rig.limits.rig = 0;
+    limits_changed();
+    host(line, 14);
+    later(2000);
+    read_at_home();
+    obstacle_beside_the_line(UM(100) + 1);
+    later(7500);
+    for (size_t i = 0; i < 14; i++) {
+        TEST_ASSERT_TRUE(pull());
+        later(174);
+    }
+    expect_state(DR_GUARD_MOVING_S);
+    mpc_line_has_begun(0);
+    obstacle_beside_the_line(UM(300) + 1);
+    later(45500);
+    for (size_t i = 2; i < 14; i++) {
+        TEST_ASSERT_TRUE(pull());
+        later(79);
+    }
+    expect_state(DR_GUARD_MOVING_S);
+}
+
+static void an_s_may_come_out_of_its_pause_100_ms_late(void)
+{
+    for (uint32_t late_us = 100000; late_us <= 100001; late_us++) {
+        mpc_line_has_begun(0);
+        later(45500 + late_us);
+        TEST_ASSERT_TRUE(pull());
+        expect_state(late_us == 100000 ? DR_GUARD_MOVING_S : DR_GUARD_STOPPING);
     }
 }
 
@@ -403,6 +454,8 @@ int main(void)
     RUN_TEST(damage_within_a_frame_is_answered_by_silence);
     RUN_TEST(damage_forgets_no_torn_frame);
     RUN_TEST(a_motion_leaves_in_time_or_is_read_for_again);
+    RUN_TEST(a_frame_that_left_in_time_is_not_late_while_it_leaves);
+    RUN_TEST(an_s_may_come_out_of_its_pause_100_ms_late);
     RUN_TEST(where_the_knobs_are_locked_no_reading_is_too_old);
     RUN_TEST(a_motion_that_is_late_again_and_again_is_refused);
     RUN_TEST(a_query_that_was_not_pulled_leaves_nothing_to_skip);
