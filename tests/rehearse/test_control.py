@@ -357,18 +357,20 @@ class Channel(unittest.TestCase):
         with Rehearsal("mpc") as e:
             channels = []
             for _ in range(8):
-                channels.append(socket.socket(socket.AF_UNIX))
-                self.addCleanup(channels[-1].close)
-                channels[-1].settimeout(emu.LIMIT_S)
-                channels[-1].connect(e.socket_path)
-                channels[-1].sendall(b"help quit\n")
-                self.assertTrue(json.loads(channels[-1].recv(4096))["ok"])
+                channel = socket.socket(socket.AF_UNIX)
+                self.addCleanup(channel.close)
+                channel.settimeout(emu.LIMIT_S)
+                channel.connect(e.socket_path)
+                channels.append((channel, channel.makefile("rb")))
+                channel.sendall(b"help quit\n")
+                self.assertTrue(json.loads(channels[-1][1].readline())["ok"])
             with e.lines as first:
                 self.assertEqual(json.loads(first.readline())["why"], "too many are connected")
                 self.assertEqual(first.readline(), "")
-            for channel in channels:
+            for channel, answers in channels:
                 channel.sendall(b"state\n")
-                self.assertTrue(channel.recv(10).startswith(b'{"ok":true'))
+                self.assertTrue(json.loads(answers.readline())["ok"])
+                answers.close()
             self.assertEqual(ctl(e.socket_path, "state")[0], 0)
 
     def test_quit_ends_it(self):
@@ -439,6 +441,7 @@ class Channel(unittest.TestCase):
                     self.assertEqual(port.ask(b"K", 4), emu.ACTIVE[1])
                     port.send(b"M" + point(16, 0, 0))
                     e.do("advance until idle")
+                    emu.wait_until(lambda: port.waiting() == 1, "the CR")
                     port.send(b"C")
                     e.do("advance 1ms")
                 e.do("state")  # by then it is known that nobody has the port open
