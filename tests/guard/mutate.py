@@ -418,6 +418,7 @@ def main():
     parser.add_argument('--again', action='store_true')
     parser.add_argument('--quick', action='store_true')
     arguments = parser.parse_args()
+    os.nice(10)  # others keep time
     work = arguments.work.resolve()
     work.mkdir(parents=True, exist_ok=True)
     project = Project()

@@ -150,7 +150,7 @@ class Sources(unittest.TestCase):
                 for package in packages.removeprefix("apt-get install -y ").split():
                     self.assertRegex(setup, rf"[( ]{re.escape(package)}[ )]")
                 script = "\n".join(commands).replace("dryrig/build", "build")  # not within the sources
-                subprocess.run(["sh", "-ec", script], cwd=directory, check=True, capture_output=True, timeout=1500,
+                subprocess.run(["nice", "sh", "-ec", script], cwd=directory, check=True, capture_output=True, timeout=1500,
                                env=dict(os.environ, DESTDIR=os.path.join(directory, "installed")))
             installed = os.path.join(directory, "installed", "usr", "local", "bin", "dryrig-emu")
             self.assertEqual(0, subprocess.run([installed, "run", "trio", "--", "true"], check=False, timeout=LIMIT_S).returncode)
