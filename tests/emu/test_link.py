@@ -84,12 +84,13 @@ class Link(emu.InDirectory):
 
     def test_what_kill_9_leaves_is_replaced_though_its_number_was_given_away(self):
         e = self.killed()
-        ends = []  # somebody else gets the number
+        ends = []  # somebody else gets the number: we, or another test
         while not os.path.exists(e.path):
             ends += pty.openpty()
+        is_ours = e.path in map(os.ttyname, ends[1::2])
         try:
             with Emulator("mpc", "--link", self.link) as again:
-                self.assertNotEqual(again.path, e.path)
+                self.assertFalse(is_ours and again.path == e.path)
                 self.answers()
         finally:
             for end in ends:
