@@ -55,7 +55,8 @@ TIMERS = ('frame', 'resync', 'task', 'read', 'send', 'proof', 'repeat', 'idle', 
 
 PROOFS = [guard(*case) for case in (
     ('start',),
-    ('pulled_byte', None, (), ('dr_guard.c', 'if (g->stops_out > 0 && !is_leaving(g))', 'if (g->stops_out > 0)')),
+    ('pulled_byte', None, (), ('dr_guard.c', 'if (g->stops_out > 0 && !is_leaving(g))', 'if (g->stops_out > 0)'),
+     ('dr_guard_pull_device.0:4',)),
     ('bytes_for_the_host',),
     ('person', None, (), ('dr_guard_people.c', '!g->stop_latched && !g->wiring_alarm', '!g->wiring_alarm')),
     ('cable', None, (), ('dr_guard_people.c', 'g->out_at = g->out_count = g->out_ready = g->stops_out = 0;', '')),
