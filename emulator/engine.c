@@ -264,6 +264,7 @@ bool engine_plug_station(engine *e, station *s, char *why, size_t room)
         station_unplug(s, e->inotify);
         return false;
     }
+    station_say(s, OBSERVED_EVENT, "the USB plug is in");
     return true;
 }
 

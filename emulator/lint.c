@@ -325,7 +325,7 @@ static bool leaves_one_of_each(lint *l, lint_station *s, uint32_t unread)
     const lint_left *const left = &s->left;
     const unsigned last = follows_position(s) ? 1 : 0;
     if (!left->is_known)
-        return last == 1 && unread == 1;
+        return last == 1 && unread == 1 && left->supposed == 0;
     if (left->positions + last == 0 || unread != left->bytes + last)
         return false;
     for (unsigned i = left->first; i < l->finding_count; i++)
@@ -417,7 +417,7 @@ static bool moves(const lint_station *s, dr_op op)
     return dr_command_for(s->kind, s->ins->controller.firmware, op, &command) && (command.is & DR_IS_MOTION) != 0;
 }
 
-/* Where the clock jumps, a move ends before a host can stop it: its CR is there, and ^C gets another one. A host that reads
+/* Where the clock jumps, or runs faster, a move ends before a host can stop it: its CR is there, and ^C gets another one. A host that reads
  * one CR behind ^C, as the manuals say, is one byte off from then on, until it has read everything. */
 static void look_for_late_stop(lint *l, lint_station *s, bool is_interrupt, bool was_owed)
 {
@@ -426,7 +426,8 @@ static void look_for_late_stop(lint *l, lint_station *s, bool is_interrupt, bool
         s->stopped_late = is_behind;
         l->late_stops += s->stopped_late && !s->told_late_stop ? 1u : 0u;
         s->told_late_stop = true;
-    } else if (is_interrupt && l->clock_jumps && !was_owed && is_behind && !s->stopped_late && moves(s, s->last)) {
+    } else if (is_interrupt && l->runs_ahead != NULL && !was_owed && is_behind && !s->stopped_late &&
+               moves(s, s->last)) {
         s->stopped_late = true;
         s->told_late_stop = false;
     }

@@ -2,7 +2,8 @@
  *
  * An observer (observe.h) of any number of stations. A command is judged as the host wrote it, not as it arrived: what the
  * host had been answered and had read by then decides. Nothing is judged that the host could not know: moves begun by hand,
- * a controller without power or one that hangs, what follows a fault, and what follows a ^C that a jumping clock has made late.
+ * a controller without power or one that hangs, what follows a fault, and what follows a ^C that came late because the
+ * controller's clock runs ahead.
  *
  * The rules, their numbers and their names stay: a report of today can be compared with one of next year.
  *
@@ -93,14 +94,16 @@ typedef struct {
     bool said_streaming; /* 'F' or 'O' since the port was opened or the power came on */
     bool told_streaming; /* rule 14 once for each such time */
     bool is_excused;     /* a fault has struck since the last command */
-    bool stopped_late;   /* clock_jumps: a move was over before its ^C, and not all has been read since */
+    bool stopped_late;   /* runs_ahead: a move was over before its ^C, and not all has been read since */
     bool told_late_stop;
     bool is_open;
 } lint_station;
 
 typedef struct {
     observer base;
-    bool clock_jumps; /* set by the owner behind lint_open(): no host can stop a move in time */
+    const char
+        *runs_ahead; /* set by the owner behind lint_open(): the option by which moves end sooner than a host can stop
+                             * them; NULL: none */
     lint_station *stations;
     unsigned station_count;
     lint_finding *findings; /* in order of time */

@@ -68,10 +68,11 @@ bool lint_report_text(const lint *l, FILE *file)
     if (l->late_stops > 0)
         (void)fprintf(
             file,
-            "dryrig-emu: --clock jump ends a move before ^C can stop it. %lu time%s the host read one CR where there "
-            "were two, the move's and ^C's, and was a byte behind from then on, which is not judged. Use --clock "
-            "step or real where programs stop moves.\n",
-            l->late_stops, plural(l->late_stops));
+            "dryrig-emu: with %s a move was over before its ^C came. %lu time%s the host read one CR where there were "
+            "two, the move's and ^C's, and was a byte behind from then on, which is not judged. Use --clock step, or "
+            "real "
+            "time, where programs stop moves.\n",
+            l->runs_ahead, l->late_stops, plural(l->late_stops));
     if (total == 0)
         return true;
     (void)fprintf(file,

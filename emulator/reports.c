@@ -34,7 +34,7 @@ bool reports_open(reports *r, const options *o, station *stations, unsigned stat
     }
     if (o->lints) {
         lint_open(&r->lint);
-        r->lint.clock_jumps = o->clock == CLOCK_JUMP;
+        r->lint.runs_ahead = o->clock == CLOCK_JUMP ? "--clock jump" : o->speedup > 1 ? "--speedup" : NULL;
     }
     if (o->trace != NULL && !trace_open(&r->trace, o->trace, station_count > 1))
         return cannot("trace", o->trace);

@@ -307,10 +307,10 @@ static void who_gives_up_and_interrupts_has_done_right(void)
 }
 
 /* M, and ^C when its CR is already there; then one CR is read, as behind a move that ^C has stopped. */
-static void stop_a_move_that_is_over(bool clock_jumps)
+static void stop_a_move_that_is_over(bool runs_ahead)
 {
     start(DR_MPC);
-    l.clock_jumps = clock_jumps;
+    l.runs_ahead = runs_ahead ? "--clock jump" : NULL;
     say_move("M", 16000, 0, 0);
     bench_wait_us(&b, 333334);
     TEST_ASSERT_EQUAL(1, b.unread);
@@ -341,7 +341,7 @@ static void a_stop_that_a_jumping_clock_makes_late_is_not_the_hosts_fault(void)
 static void a_late_stop_of_a_quick_host(void)
 {
     start(DR_MPC);
-    l.clock_jumps = true;
+    l.runs_ahead = "--speedup";
     say_move("M", 16000, 0, 0);
     bench_wait_us(&b, 333334);
     bench_read(&b, 1);
@@ -389,7 +389,7 @@ static void a_late_stop_is_the_hosts_where_time_goes(void)
 static void a_stop_behind_a_query_that_was_left_unread_excuses_nothing(void)
 {
     start(DR_MPC);
-    l.clock_jumps = true;
+    l.runs_ahead = "--speedup";
     bench_say(&b, "K", 1);
     bench_wait_us(&b, 3000);
     bench_say(&b, "\x03", 1);
@@ -792,6 +792,20 @@ static void who_clears_the_buffer_leaves_nothing_to_be_counted(void)
     TEST_ASSERT_EQUAL(LINT_UNREAD_REPLY, l.findings[0].rule);
 }
 
+/* What is left behind ^C is of the move, and so is what is left behind the position. */
+static void a_byte_that_is_left_behind_a_stop_is_none_of_a_position(void)
+{
+    stop_a_move_that_is_over(false);
+    bench_read(&b, ALL);
+    b.has_read_behind = true;
+    bench_wait_us(&b, 3000);
+    bench_say(&b, "C", 1);
+    bench_read(&b, 13);
+    bench_tell(&b, OBSERVED_CLOSED);
+    TEST_ASSERT_EQUAL(0, l.counts[LINT_THIRTEEN_BYTES]);
+    TEST_ASSERT_EQUAL(2, l.counts[LINT_UNREAD_REPLY]);
+}
+
 /* Byte 13 has left 174 + 2,257 us after the question, byte 14 leaves at 174 + 2,431 us [T table 3]. */
 static void a_program_that_goes_on_when_the_13th_byte_is_there_is_named(void)
 {
@@ -1052,6 +1066,7 @@ int main(void)
     RUN_TEST(another_baud_rate_is_wrong);
     RUN_TEST(the_controllers_baud_rates_are_right);
     RUN_TEST(a_program_that_reads_13_bytes_of_14_is_named);
+    RUN_TEST(a_byte_that_is_left_behind_a_stop_is_none_of_a_position);
     RUN_TEST(a_program_that_leaves_while_the_rest_is_on_the_line_is_named);
     RUN_TEST(a_program_that_reads_13_bytes_again_and_again_is_named_each_time);
     RUN_TEST(a_quick_program_that_reads_13_bytes_is_named_when_it_leaves);

@@ -121,7 +121,8 @@ class Lint(realtime.TestCase):
                    "def ask(data, count):\n    time.sleep(0.003)\n    p.write(data)\n    p.read(count)\n"
                    "time.sleep(0.003)\np.write(b'M' + bytes([128, 26, 6, 0] * 3))\ntime.sleep(0.05)\n"
                    "ask(b'\\x03', 1)\nask(b'C', 14)\nask(b'U', 6)\nask(b'K', 4)\n")
-        for options, wanted in (((), ""), (("--clock", "jump"), "--clock jump ends a move before ^C can stop it. 1 time ")):
+        for options, wanted in (((), ""), (("--clock", "jump"), "with --clock jump a move was over before its ^C came. 1 time "),
+                                (("--speedup", "1000"), "with --speedup a move was over before its ^C came. 1 time ")):
             status, _, err = emulator("run", "mpc", *options, "--strict", "--", sys.executable, "-c", program)
             self.assertEqual((0, wanted == ""), (status, err == ""), err)
             self.assertIn(wanted, err)

@@ -185,7 +185,7 @@ class Hands(unittest.TestCase):
                         e.do("advance 2s")
                     hung_up = select.poll()
                     hung_up.register(port.fd, 0)
-                    self.assertEqual([event for _, event in hung_up.poll(emu.LIMIT_S * 1000)], [select.POLLHUP | select.POLLERR])
+                    self.assertEqual([event & select.POLLHUP for _, event in hung_up.poll(emu.LIMIT_S * 1000)], [select.POLLHUP])
                     try:
                         self.assertEqual(os.read(port.fd, 1), b"")
                     except OSError:
