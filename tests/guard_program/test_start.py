@@ -72,6 +72,12 @@ class Failing(realtime.TestCase):
                 self.fails(directory, 1, ["No such file"], *base, "--link", free, "--control", directory + "/none/ctl")
                 self.fails(directory, 1, ["No such file"], *base, "--link", free, "--log", directory + "/none/log")
                 self.fails(directory, 1, [": is no file"], *base, "--link", free, "--log", "/dev/null")
+                with emu.Emulator("mpc", "--record", directory + "/rec") as _:
+                    with open(directory + "/rec", encoding="ascii") as recorded:
+                        before = recorded.read()
+                    self.fails(directory, 1, ["another program records at"], *base, "--link", free, "--record", directory + "/rec")
+                    with open(directory + "/rec", encoding="ascii") as recorded:
+                        self.assertEqual(recorded.read(), before)
                 self.fails(directory, 1, ["another guard keeps its log there"], *base, "--link", free, "--log", g.log)
                 self.fails(directory, 1, ["1 to 107 characters"], *base, "--control", directory + "/" + "x" * 200)
                 self.assertEqual(g.status()["state"], "disarmed")
@@ -306,6 +312,8 @@ class Killed(realtime.TestCase):
         self.assertTrue(os.path.islink(self.guard.link)) # left over
         self.guard.start()
         self.nothing_moves()
+        self.assertEqual(self.guard.status()["disarmed_says"], "the guard before did not end in order")
+        self.assertIn("disarmed: the guard before did not end in order", self.guard.err())
         with open(self.guard.log, encoding="utf-8") as file:
             self.assertIn("^C: the guard was not stopped in order before", file.read())
         self.assertEqual(guard.run("log", self.guard.log)[0], 0)

@@ -408,6 +408,8 @@ static int start_and_run(bridge *b, bool after_crash)
                                   : DR_START_POWER_ON);
     if (printf("ready %s\n", b->host.path) < 0 || fflush(stdout) != 0)
         return fail("cannot write the line 'ready' to stdout", strerror(errno));
+    if (after_crash || b->mark.is_set)
+        b->disarmed_says = "the guard before did not end in order";
     read_hints(b);
     orders_tell(b);
     for (;;) {

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE /* poll, fileno, fopen "e" */
+#define _GNU_SOURCE /* poll, fileno, flock, fopen "e" */
 #include "recording.h"
 
 #include "say.h"
@@ -9,7 +9,9 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 FILE *recording_file(const char *path)
 {
@@ -35,6 +37,23 @@ bool recording_may_replace(const char *path)
     return is_ours;
 }
 
+/* Emptied when nobody else writes it. NULL: errno says why; EBUSY: somebody does. */
+static FILE *open_alone(const char *path)
+{
+    struct stat is;
+    if (stat(path, &is) != 0 || !S_ISREG(is.st_mode))
+        return recording_file(path);
+    const int fd = open(path, O_WRONLY | O_CLOEXEC);
+    const bool is_others = fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    FILE *const file = fd >= 0 && !is_others && ftruncate(fd, 0) == 0 ? fdopen(fd, "w") : NULL;
+    if (file != NULL || fd < 0)
+        return file;
+    const int why = is_others ? EBUSY : errno;
+    (void)close(fd);
+    errno = why;
+    return NULL;
+}
+
 bool recording_open(recording *r, const char *program, const char *path)
 {
     struct stat is;
@@ -44,10 +63,14 @@ bool recording_open(recording *r, const char *program, const char *path)
         errno = EEXIST;
         return false;
     }
-    r->file = recording_file(path);
+    r->file = open_alone(path);
+    if (r->file == NULL && errno == EBUSY)
+        say("%s: another program records at %s: choose another path\n", program, path);
     if (r->file == NULL)
         return false;
     r->is_file = fstat(fileno(r->file), &is) == 0 && S_ISREG(is.st_mode);
+    if (r->is_file)
+        (void)flock(fileno(r->file), LOCK_EX | LOCK_NB); /* a new one; where there are no locks: without */
     if (!r->is_file)
         (void)setvbuf(r->file, NULL, _IOLBF, BUFSIZ);
     if (dr_recording_begin(r->file))
