@@ -213,6 +213,10 @@ class Stopping(realtime.TestCase):
                 self.assertEqual(self.until(follower, "disarmed")["disarmed_says"], "nothing was moved for a while (arm_idle_s)")
                 g.arm()
                 self.until(follower, "armed")
+                g.order("clear")
+                self.assertEqual(self.until(follower, "disarmed")["disarmed_says"], "somebody has said 'clear'")
+                g.arm()
+                self.until(follower, "armed")
                 g.order("tip-changed")
                 self.assertEqual(self.until(follower, "disarmed")["disarmed_says"], "the tip was changed")
 

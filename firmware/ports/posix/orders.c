@@ -247,6 +247,7 @@ static void continue_clearing(bridge *b, const dr_guard_status *status)
         return;
     if (!b->order_pressed) {
         b->order_pressed = true;
+        b->disarmed_says = status->state == DR_GUARD_IDLE ? "somebody has said 'clear'" : b->disarmed_says;
         set_input(b, DR_INPUT_KEY, false);
         set_input(b, DR_INPUT_KEY, true);
     } else {
