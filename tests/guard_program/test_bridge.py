@@ -221,14 +221,14 @@ class Stopping(realtime.TestCase):
                 self.assertEqual(self.until(follower, "disarmed")["disarmed_says"], "the tip was changed")
 
     def test_stderr_tells_how_many_refusals_it_left_out(self):
-        """One line a second at most, and then their number: nothing seems to have passed that did not."""
+        """One refusal a second at most, with the number of those before it: nothing seems to have passed that did not."""
         with guarded("mpc", rig(guard.MPC, high=1000)) as (_, g, port):
             g.order("disarm")
             for n in range(1, 6):
                 port.send(move_mpc(10 * n, 0, 0))
                 emu.wait_until(lambda: g.status()["refused"] == n, "the refusal")
             emu.wait_until(lambda: self.refusals_told(g) == 5, "all of them to be told")
-            self.assertIn(f"more refused: 'dryrig-guard ctl {g.socket} log' tells each\n", g.err())
+            self.assertIn(f"more before it: 'dryrig-guard ctl {g.socket} log' tells each\n", g.err())
             port.send(move_mpc(60, 0, 0) + move_mpc(70, 0, 0))
             emu.wait_until(lambda: g.status()["refused"] == 7, "the refusals")
             g.stop() # which does not wait for the second
@@ -252,7 +252,7 @@ class Stopping(realtime.TestCase):
 
     @staticmethod
     def refusals_told(g):
-        return g.err().count("refused 'move'") + sum(int(n) for n in re.findall(r"and (\d+) more refused", g.err()))
+        return g.err().count("refused 'move'") + sum(int(n) for n in re.findall(r"and (\d+) more before it", g.err()))
 
     @staticmethod
     def until(follower, state):

@@ -427,50 +427,40 @@ static void say_state(bridge *b, const dr_guard_status *now)
         say("  it cannot be armed: there is no --control socket\n");
 }
 
-/* Of several at once the last one is told, and how many there were beside it. */
-static void say_refusal(bridge *b, const dr_guard_status *now)
+/* The last one, and how many there were since one was told. */
+static void say_refusals(bridge *b, const dr_guard_status *now)
 {
+    const bridge_options *const o = b->options;
     char text[GUARD_WORDS_MAX];
-    b->refusals_left_out += now->refused - b->shown.refused;
-    if (b->now_us < b->refusals_quiet_us)
-        return;
-    b->refusals_left_out--;
+    const unsigned more = b->refusals_left_out - 1u;
+    b->refusals_left_out = 0;
     b->refusals_quiet_us = b->now_us + REFUSALS_APART_US;
     (void)guard_words_verdict(text, sizeof text, &b->rig, &now->last_refusal);
     say("dryrig-guard: refused '%s': %s\n", dr_words_command((dr_op)now->last_op)->name, text);
-}
-
-static void say_left_out(bridge *b)
-{
-    const bridge_options *const o = b->options;
-    const unsigned count = b->refusals_left_out;
-    if (count == 0)
-        return;
-    if (o->control != NULL)
-        say("dryrig-guard: and %u more refused: 'dryrig-guard ctl %s log' tells each\n", count, o->control);
-    else if (o->log != NULL)
-        say("dryrig-guard: and %u more refused: %s tells each\n", count, o->log);
-    else
-        say("dryrig-guard: and %u more refused\n", count);
-    b->refusals_left_out = 0;
+    if (more > 0 && o->control != NULL)
+        say("  and %u more before it: 'dryrig-guard ctl %s log' tells each\n", more, o->control);
+    else if (more > 0)
+        say("  and %u more before it%s%s%s\n", more, o->log != NULL ? ": " : "", o->log != NULL ? o->log : "",
+            o->log != NULL ? " tells each" : "");
 }
 
 void orders_end(bridge *b)
 {
     orders_tell(b);
-    say_left_out(b);
+    if (b->refusals_left_out > 0)
+        say_refusals(b, &b->shown);
 }
 
 void orders_tell(bridge *b)
 {
     dr_guard_status now;
     dr_guard_get_status(&b->guard, &now);
-    if (b->now_us >= b->refusals_quiet_us)
-        say_left_out(b);
+    if (b->shown_any)
+        b->refusals_left_out += now.refused - b->shown.refused;
+    if (b->refusals_left_out > 0 && b->now_us >= b->refusals_quiet_us)
+        say_refusals(b, &now);
     if (b->shown_any && is_same(&now, &b->shown))
         return;
-    if (b->shown_any && now.refused != b->shown.refused)
-        say_refusal(b, &now);
     if (is_resting(now.state) && !has(&now, DR_NEEDS_REST) &&
         (!b->said_any || now.state != b->said_state || now.fault != b->said_fault)) {
         b->said_any = true;
