@@ -113,13 +113,11 @@ class Port:
         return got
 
     def receive_through(self, ending):
-        """Up to these bytes, or what came until the limit."""
+        """Up to these bytes, behind which nothing comes, or what came until the limit."""
         got = b""
-        while not got.endswith(ending):
-            more = self.receive(1)
-            if not more:
-                break
-            got += more
+        end = time.monotonic() + LIMIT_S
+        while not got.endswith(ending) and select.select([self.fd], [], [], max(0.0, end - time.monotonic()))[0]:
+            got += os.read(self.fd, 65536)
         return got
 
     def ask(self, data, count):
