@@ -130,9 +130,11 @@ unsigned long lint_total(const lint *l)
 
 /* -- What the host is owed --------------------------------------------------------------------------------------------- */
 
-static bool is_deaf(const dr_controller *c)
+static bool is_deaf(const instrument *ins)
 {
-    return c->state == DR_STATE_OFF || c->state == DR_STATE_BOOTING || c->state == DR_STATE_WEDGED;
+    const dr_controller *const c = &ins->controller;
+    return c->state == DR_STATE_OFF || c->state == DR_STATE_BOOTING || c->state == DR_STATE_WEDGED ||
+           ins->faults.is_wedged;
 }
 
 /* A move of the host's is under way. */
@@ -395,7 +397,7 @@ static void judge_turn(lint *l, lint_station *s, const observation *seen, const 
 {
     if (s->is_excused || s->stopped_late || s->command_ns == 0) {
         was_counted(l, s, s->unread);
-        s->left.is_known = s->command_ns == 0; /* who has just opened the port finds nothing of before */
+        s->left.is_known = !s->read_behind;
         return;
     }
     if (was_owed) {
@@ -448,7 +450,7 @@ static void command_written(lint *l, lint_station *s, const observation *seen, c
     }
     s->last = (dr_op)command->op;
     s->in_flight++;
-    s->is_excused = false;
+    s->is_excused = s->is_excused && was_owed; /* it is still late because of the fault */
     s->command_ns = seen->real_ns;
     s->reply_ns = 0;
     s->lost_reply = false;
@@ -506,7 +508,7 @@ static void bytes_from_host(lint *l, lint_station *s, const observation *seen)
     bool is_astray = false; /* what follows a command that is not known may be its arguments */
     if (s->ins->arriving_count == 0)
         s->in_flight = 0; /* also what got lost on the line */
-    if (is_deaf(c))
+    if (is_deaf(s->ins))
         return; /* and so is the framer of the controller */
     for (size_t i = 0; i < seen->count; i++) {
         dr_command command;
@@ -570,7 +572,7 @@ static void port_left(lint *l, lint_station *s, const observation *seen)
     s->stopped_late = false;
     if (stopped_late && seen->unread > 0 && !s->told_late_stop)
         l->late_stops++;
-    if (!has_spoken || s->is_excused || stopped_late || is_deaf(&s->ins->controller))
+    if (!has_spoken || s->is_excused || stopped_late || is_deaf(s->ins))
         return;
     const uint32_t left = seen->unread + to_come(s);
     if (left == 1 && leaves_one_of_each(l, s, left))

@@ -93,8 +93,8 @@ typedef struct {
     bool lost_reply;     /* to the last command, or a part of it: it could not be put into the port */
     bool said_streaming; /* 'F' or 'O' since the port was opened or the power came on */
     bool told_streaming; /* rule 14 once for each such time */
-    bool is_excused;     /* a fault has struck since the last command */
-    bool stopped_late;   /* runs_ahead: a move was over before its ^C, and not all has been read since */
+    bool is_excused; /* a fault has struck since the last command, or before, and what it has made late has not come */
+    bool stopped_late; /* runs_ahead: a move was over before its ^C, and not all has been read since */
     bool told_late_stop;
     bool is_open;
 } lint_station;

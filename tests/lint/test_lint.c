@@ -474,6 +474,51 @@ static void what_follows_a_fault_is_not_judged(void)
     found_nothing();
 }
 
+/* The CR of the first answer comes long after the host has given up, asked again, and again, and left. */
+static void what_a_fault_has_made_late_is_not_judged_until_it_comes(void)
+{
+    start(DR_MPC);
+    say_move("M", 16000, 0, 0); /* stands for what is late: the host could know nothing of a move */
+    bench_tell(&b, OBSERVED_FAULT);
+    for (unsigned i = 0; i < 2; i++) {
+        bench_wait_us(&b, 110000);
+        bench_say(&b, "C", 1);
+    }
+    bench_tell(&b, OBSERVED_CLOSED);
+    found_nothing();
+}
+
+static void what_comes_when_nothing_is_late_any_more_is_judged(void)
+{
+    start(DR_MPC);
+    say_move("M", 16000, 0, 0);
+    bench_tell(&b, OBSERVED_FAULT);
+    bench_wait_us(&b, 110000);
+    bench_say(&b, "C", 1);
+    bench_wait_us(&b, 1000000);
+    bench_read(&b, 14);
+    bench_say(&b, "C", 1); /* excused for the last time */
+    bench_wait_us(&b, 3000);
+    bench_read(&b, 14);
+    bench_say(&b, "K", 1);
+    found(LINT_UNREAD_REPLY, 1);
+}
+
+static void a_controller_that_a_fault_has_wedged_hears_nothing(void)
+{
+    start(DR_MPC);
+    bench_say(&b, "K", 1);
+    bench_read(&b, ALL);
+    b.ins.faults.is_wedged = true;
+    bench_tell(&b, OBSERVED_FAULT);
+    for (unsigned i = 0; i < 3; i++) {
+        bench_wait_us(&b, 1000000);
+        bench_say(&b, "C", 1);
+    }
+    bench_tell(&b, OBSERVED_CLOSED);
+    found_nothing();
+}
+
 /* -- 8 and 9 ----------------------------------------------------------------------------------------------------------- */
 
 static void a_command_of_the_other_controller_is_wrong(void)
@@ -1043,6 +1088,9 @@ int main(void)
     RUN_TEST(closing_when_all_is_read_leaves_nothing);
     RUN_TEST(an_interrupt_may_leave_streamed_positions_unread);
     RUN_TEST(what_follows_a_fault_is_not_judged);
+    RUN_TEST(what_a_fault_has_made_late_is_not_judged_until_it_comes);
+    RUN_TEST(what_comes_when_nothing_is_late_any_more_is_judged);
+    RUN_TEST(a_controller_that_a_fault_has_wedged_hears_nothing);
     RUN_TEST(a_command_of_the_other_controller_is_wrong);
     RUN_TEST(a_command_of_another_firmware_is_wrong);
     RUN_TEST(a_command_that_went_is_wrong);

@@ -1,5 +1,6 @@
 """run, lint, --record and replay through the port: programs that are right, and the example of docs/ci.md, which is not."""
 import json
+import multiprocessing.pool
 import os
 import re
 import subprocess
@@ -50,6 +51,22 @@ class Lint(realtime.TestCase):
                 status, _, err = emulator("run", kind, "--clock", "jump", "--work", "160,160,160", "--strict", "--",
                                           *script(kind, RIGHT[kind]))
                 self.assertEqual((0, ""), (status, err))
+
+    def test_the_command_line_breaks_no_rule_whatever_goes_wrong(self):
+        """Every fault, at its first command or a later one: what it does then may fail, but keeps the rules."""
+        def one(what):
+            kind, fault, skipped = what
+            when = f"after {skipped} commands fault {fault}" if skipped else f"fault {fault}"
+            commands = ["move 500 400 300", "line 10 20 30 --speed 9" + (" --stream" if kind == "mpc" else "")]
+            return what, emulator("run", kind, "--do", when, "--", "sh", "-c", script(kind, commands)[2].replace("\n", ";"))
+
+        _, listed, _ = emulator("run", "mpc", "--", "sh", "-c", f'{EMULATOR} ctl "$DRYRIG_CONTROL" faults')
+        names = [fault["fault"] + (" y" if fault["takes_axis"] else "") for fault in json.loads(listed)["faults"]]
+        self.assertGreater(len(names), 15)
+        with multiprocessing.pool.ThreadPool(4) as pool:
+            for what, (_, _, err) in pool.imap_unordered(one, [(kind, name, (number + offset) % 2 * 2) for number, name in enumerate(names)
+                                                               for offset, kind in enumerate(RIGHT)]):
+                self.assertNotIn("dryrig-emu lint", err, what)
 
     def test_the_example_passes_with_a_fake_port(self):
         done = subprocess.run([sys.executable, "test_fake.py"], cwd=EXAMPLE, capture_output=True, timeout=LIMIT_S,
