@@ -2,6 +2,7 @@
 
 No pyserial, no tty module: os.open() and os.read() must do. Waiting is always for something, with a limit that only a broken
 program reaches; nothing here measures how fast anything is."""
+import atexit
 import contextlib
 import fcntl
 import os
@@ -21,7 +22,16 @@ LIMIT_S = 60.0
 def start(*args, **popen):
     options = dict(stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL)
     options.update(popen)
-    return subprocess.Popen([PROGRAM, *args], **options)
+    return ended_with_us(subprocess.Popen([PROGRAM, *args], **options))
+
+
+def ended_with_us(process):
+    """No process is left behind, however a test ends."""
+    def end():
+        process.kill()
+        process.wait()
+    atexit.register(end)
+    return process
 
 
 def outcome(*args):

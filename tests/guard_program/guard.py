@@ -99,7 +99,7 @@ class Guard:
             options = dict(stdout=subprocess.PIPE, stderr=err, stdin=subprocess.DEVNULL)
             options.update(self.popen)
             options["env"] = {**(options.get("env") or os.environ), "DRYRIG_LOCK_DIR": self.lock_directory}
-            self.process = subprocess.Popen([PROGRAM, *self.args], **options)
+            self.process = emu.ended_with_us(subprocess.Popen([PROGRAM, *self.args], **options))
         line = self.process.stdout.readline().decode()
         if not line.startswith("ready /dev/pts/"):
             self.process.kill()

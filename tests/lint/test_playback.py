@@ -8,6 +8,7 @@ import tempfile
 import time
 import unittest
 
+import emu
 import realtime
 
 EMULATOR = os.environ["DRYRIG_EMU"]
@@ -41,8 +42,7 @@ class Program:
     """An emulator that says `ready`."""
 
     def __init__(self, *args):
-        self.process = subprocess.Popen([EMULATOR, *args], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                        stderr=subprocess.PIPE)
+        self.process = emu.start(*args)
         line = self.process.stdout.readline().decode()
         self.port = line.split()[1] if line.startswith("ready ") else None
 
