@@ -75,6 +75,14 @@ static bool is_due(const dr_guard *g, dr_us now)
     return earliest(g, &timer) && !dr_us_before(now, g->at[timer]);
 }
 
+/* What an event leaves to be done. */
+static void settle(dr_guard *g, dr_us now)
+{
+    if (g->torn && g->device_present) /* found now: to the guard it is as unplugged */
+        dr_g_link(g, now, g->host_open, g->plugged);
+    dr_g_show_state(g, now);
+}
+
 /* Every call that may change something is between begin() and end(). */
 static void begin(dr_guard *g, dr_us now)
 {
@@ -84,7 +92,7 @@ static void begin(dr_guard *g, dr_us now)
         const dr_us when = g->at[timer];
         clear_timer(g, timer);
         happen(g, timer, when);
-        dr_g_show_state(g, when);
+        settle(g, when);
     }
 }
 
@@ -93,13 +101,6 @@ static bool is_between_bytes(const dr_guard *g)
 {
     return g->framer.have == 0 && g->out_at == g->out_ready && (g->read_phase != READ_SENT || g->read_have == 0) &&
            (g->task != TASK_PASS || g->reply_have == 0);
-}
-
-static void settle(dr_guard *g, dr_us now)
-{
-    if (g->torn && g->device_present) /* found now: to the guard it is as unplugged */
-        dr_g_link(g, now, g->host_open, g->plugged);
-    dr_g_show_state(g, now);
 }
 
 static void end(dr_guard *g, dr_us now)

@@ -1310,6 +1310,24 @@ static void what_waits_for_a_torn_controller_is_forgotten(void)
     TEST_ASSERT_TRUE(dr_guard_is_mid_frame(&rig.guard));
 }
 
+/* CONFIRM in the very call that finds the frame torn: who was cycled is asked who it is. */
+static void confirmed_when_it_is_found_torn(void)
+{
+    uint8_t bytes[16];
+    bench_mpc();
+    dr_guard_init(&rig.guard, &rig.limits, rig.ring, 64);
+    dr_guard_start(&rig.guard, 0, DR_START_POWER_ON);
+    dr_guard_link(&rig.guard, 0, true, true);
+    for (unsigned i = 0; i < 11; i++)
+        dr_guard_push_host(&rig.guard, 0, (const uint8_t *)"\x03", 1);
+    TEST_ASSERT_EQUAL(11, dr_guard_pull_device(&rig.guard, 0, bytes, sizeof bytes));
+    dr_guard_input(&rig.guard, 2000000, DR_INPUT_CONFIRM, true); /* a query, the twelfth byte, was due after 1 s */
+    TEST_ASSERT_FALSE(dr_guard_is_mid_frame(&rig.guard));
+    TEST_ASSERT_EQUAL(0, dr_guard_pull_device(&rig.guard, 2900000, bytes, sizeof bytes));
+    TEST_ASSERT_EQUAL(1, dr_guard_pull_device(&rig.guard, 3100000, bytes, sizeof bytes));
+    TEST_ASSERT_EQUAL_HEX8('C', bytes[0]);
+}
+
 /* One that has been proved hears each ^C, answered or not. */
 static void a_controller_that_is_proved_is_told_to_stop_as_often_as_wanted(void)
 {
@@ -1328,6 +1346,7 @@ int main(void)
     RUN_TEST(row_74_nobody_completes_an_s_that_nobody_remembers);
     RUN_TEST(a_controller_that_says_something_is_not_torn);
     RUN_TEST(what_waits_for_a_torn_controller_is_forgotten);
+    RUN_TEST(confirmed_when_it_is_found_torn);
     RUN_TEST(a_controller_that_is_proved_is_told_to_stop_as_often_as_wanted);
     RUN_TEST(the_controller_to_order_works_when_nothing_is_ordered);
     RUN_TEST(row_74_a_reset_within_a_frame_leaves_nothing_that_completes_it);

@@ -293,6 +293,8 @@ static void any_guard(void)
 /* -- One event after another ------------------------------------------------------------------------------------------ */
 
 static uint8_t danger(const dr_guard *of) { return of->mode == MODE_ARMED ? 2 : of->mode == MODE_DISARMED ? 1 : 0; }
+/* In the call under way; settle() does the rest. */
+static bool found_torn(void) { return g.torn && g.device_present && g.limits != NULL; }
 static bool was_leaving(void) { return before.out_at > 0 && before.out_at < before.out_count; }
 
 /* What every event but a pull keeps to. */
@@ -342,6 +344,8 @@ void proof_timer(void)
     assume(is_running(&g, timer));
     clear_timer(&g, timer);
     happen(&g, timer, now);
+    settle(&g, now);
+    assert(!found_torn());
     check();
     assert(danger(&g) <= danger(&before));
     proved();
@@ -351,6 +355,7 @@ void proof_timer(void)
 void proof_person(void)
 {
     any_guard();
+    assume(!found_torn()); /* begin() has settled what its timers found */
     dr_guard_input(&g, now, (dr_input)anything_8(), anything());
     check();
     proved();
