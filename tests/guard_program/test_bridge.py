@@ -449,6 +449,11 @@ class Orders(realtime.TestCase):
             self.assertEqual(guard.run("ctl", g.socket, "surface", "off")[0], 0)
             status, out, _ = guard.run("ctl", "--json", g.socket, "log", "3")
             self.assertEqual((status, out.count('"event"')), (0, 3))
+            follower = subprocess.Popen([guard.PROGRAM, "ctl", g.socket, "status", "--follow"], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True)
+            self.assertEqual(follower.stdout.readline(), "\n")
+        out, err = follower.communicate(timeout=emu.LIMIT_S)
+        self.assertEqual((follower.returncode, err), (0, f"dryrig-guard: {g.socket}: the guard has ended, or has hung up\n"), out)
         status, _, err = guard.run("ctl", g.socket, "status")
         self.assertEqual(status, 1)
         self.assertIn("Does a guard run with --control there?", err)

@@ -149,6 +149,8 @@ int ctl_run(const char *path, const char *order, bool follows, bool is_json)
         }
     if (line == NULL || (status == 1 && !follows))
         (void)fprintf(stderr, "dryrig-guard: %s: the guard does not answer\n", path);
+    else if (follows)
+        (void)fprintf(stderr, "dryrig-guard: %s: the guard has ended, or has hung up\n", path);
     free(line);
     (void)fclose(guard);
     return status;
