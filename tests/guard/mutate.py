@@ -391,8 +391,8 @@ def report(path, results, equivalents, lines, is_quick):
     classes = ('killed', 'crashed', 'timeout', 'survived', 'identical', 'stillborn')
     out = ['# Mutation testing of the guard\'s core', '',
            f'Written by `tests/guard/mutate.py` on {datetime.now(timezone.utc):%Y-%m-%d}; `firmware/core` as of commit {commit_of_core()}.',
-           *(['A first look (--quick): without sanitizers and without tests of more than 0.1 s, which find some of the survivors.']
-             if is_quick else []),
+           *(['A first look (--quick): without sanitizers and without tests of more than 0.1 s, which find some of the survivors, but for',
+              'what a run with them had found before.'] if is_quick else []),
            'What is changed and what the classes mean stands at the head of `mutants.py` and of `mutate.py`.', '', *lines, '',
            '| file | ' + ' | '.join(classes) + ' | of the survivors argued |', '|---' * (len(classes) + 2) + '|']
     for file in files + ['all']:
