@@ -22,10 +22,13 @@ elseif(ARDUINO_BOARD STREQUAL "leonardo")
 else()
   message(FATAL_ERROR "ARDUINO_BOARD: '${ARDUINO_BOARD}' is none of uno, mega, leonardo")
 endif()
-# Prologues shared by functions (-mcall-prologues) cost some cycles a call and save a tenth of the code; register X used as the
-# chip has it, and values that a loop needs made where they are needed and not kept in registers before it, a fiftieth more.
-set(flags "-mmcu=${mcu} -DF_CPU=16000000L -ffunction-sections -fdata-sections -fstack-usage -mcall-prologues -mstrict-X")
-string(APPEND flags " -fno-move-loop-invariants")
+# Register X used as the chip has it, and values that a loop needs made where they are needed and not kept in registers before it,
+# save a fiftieth of the code; prologues shared by functions (-mcall-prologues) a tenth, and cost some cycles a call: a Mega has
+# the room, and its guard not the time.
+set(flags "-mmcu=${mcu} -DF_CPU=16000000L -ffunction-sections -fdata-sections -fstack-usage -mstrict-X -fno-move-loop-invariants")
+if(NOT ARDUINO_BOARD STREQUAL "mega")
+  string(APPEND flags " -mcall-prologues")
+endif()
 set(CMAKE_C_FLAGS_INIT "${flags}")
 set(CMAKE_CXX_FLAGS_INIT "${flags} -fno-exceptions -fno-threadsafe-statics")
 set(CMAKE_ASM_FLAGS_INIT "-mmcu=${mcu} -x assembler-with-cpp")

@@ -35,7 +35,8 @@ static struct {
     bool host_is_open;
 
     dr_us looked_at_guard;
-    bool may_move;  /* a frame has begun to leave, and no end was seen */
+    bool may_move;  /* more than a query has begun to leave, and no end was seen */
+    uint8_t query;  /* for the position */
     uint8_t steady; /* outputs */
     bool has_power, wave;
 
@@ -60,7 +61,8 @@ static void send_device(dr_us now)
         return;
     while (dr_port_line_room(DR_LINE_DEVICE) > 0 && dr_guard_pull_device(&b.guard, now, &byte, 1) == 1) {
         if (dr_guard_is_mid_frame(&b.guard))
-            survivor->mid_frame = b.may_move = true;
+            survivor->mid_frame = true;
+        b.may_move = b.may_move || byte != b.query;
         dr_port_line_write(DR_LINE_DEVICE, &byte, 1);
     }
     if (dr_guard_is_mid_frame(&b.guard)) /* a cable was pulled within it, or nobody has confirmed yet */
@@ -84,14 +86,15 @@ static bool hear_host(dr_us now)
     return count > 0;
 }
 
-/* A reply that lacks a byte is none: the guard asks again. */
-static void hear_device(dr_us now)
+/* False: it said nothing. A reply that lacks a byte is none: the guard asks again. */
+static bool hear_device(dr_us now)
 {
     uint8_t bytes[DR_REPLY_MAX];
     bool lost = false;
     const size_t count = dr_port_line_read(DR_LINE_DEVICE, bytes, sizeof bytes, &lost);
     if (count > 0)
         dr_guard_push_device(&b.guard, now, bytes, count);
+    return count > 0;
 }
 
 static void answer_host(dr_us now)
@@ -114,9 +117,12 @@ static void look_at_inputs(dr_us now)
     }
     const uint16_t on = (uint16_t)((levels & STOPS) | (b.contacts.closed & ~STOPS)), changed = on ^ b.told;
     b.told = on;
-    for (uint8_t input = 0; input <= DR_INPUT_CONFIRM && changed != 0; input++)
-        if ((changed >> input & 1u) != 0)
-            dr_guard_input(&b.guard, now, (dr_input)input, (on >> input & 1u) != 0);
+    uint16_t mask = 1;
+    for (uint8_t input = 0; input <= DR_INPUT_CONFIRM && changed != 0; input++, mask = (uint16_t)(mask << 1))
+        if ((changed & mask) != 0) {
+            dr_guard_input(&b.guard, now, (dr_input)input, (on & mask) != 0);
+            send_device(now); /* a stop is not kept waiting for the other contact */
+        }
     const bool is_open = dr_port_host_is_open();
     if (is_open != b.host_is_open)
         dr_guard_link(&b.guard, now, is_open, b.has_limits);
@@ -218,24 +224,33 @@ static void feed_watchdog(dr_us now)
 
 /* -- The loop ------------------------------------------------------------------------------------------------------ */
 
-/* The way of a stop comes first, and again before what takes longer, one thing a round. It never sleeps: contacts have no interrupt. */
+/* What the contacts and the host say that stops leaves at once. */
+static void let_stops_through(dr_us now)
+{
+    look_at_inputs(now);
+    if (hear_host(now))
+        send_device(now);
+}
+
+/* A stop must not wait: it is looked for between any two things that may take long, and of what is put off to the end one is
+ * done a round. It never sleeps: contacts have no interrupt. */
 void dr_bridge_step(void)
 {
     const dr_us now = dr_port_now_us();
-    (void)hear_host(now);
-    look_at_inputs(now);
+    let_stops_through(now);
     send_device(now);
-    hear_device(now);
+    let_stops_through(now);
+    if (hear_device(now))
+        let_stops_through(now);
     answer_host(now);
-    drive_outputs();
-    if (hear_host(now))
-        send_device(now);
+    let_stops_through(now);
     if (now - b.looked_at_guard >= SHOW_US) {
         look_at_guard(now);
     } else {
         tell_log();
         feed_watchdog(now);
     }
+    drive_outputs();
 }
 
 /* -- The start ----------------------------------------------------------------------------------------------------- */
@@ -282,6 +297,14 @@ static dr_start how_it_ended(void)
     return DR_START_POWER_ON;
 }
 
+static uint8_t query_of(const dr_limits *limits)
+{
+    dr_command query = {0, 0, 0, 0, 0, 0, 0};
+    (void)dr_command_for((dr_kind)limits->kind, limits->firmware,
+                         limits->kind == DR_TRIO ? DR_OP_TRIO_POSITION : DR_OP_MPC_POSITION, &query);
+    return query.code;
+}
+
 void dr_bridge_begin(void)
 {
     bool doubtful;
@@ -294,6 +317,7 @@ void dr_bridge_begin(void)
     dr_port_line_open(DR_LINE_HOST, baud);
     if (b.has_limits)
         dr_port_line_open(DR_LINE_DEVICE, baud);
+    b.query = query_of(&b.limits);
     const uint16_t levels = (uint16_t)(dr_port_inputs() ^ STOPS);
     dr_contacts_init(&b.contacts, levels);
     b.told = levels & PRESSES; /* what is held at the start must be let go before it is a press */

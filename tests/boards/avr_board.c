@@ -11,7 +11,10 @@
  *         board sends: the moment it is whole on the line. The same run gives the same output, to the cycle.
  *     avr_board --controller trio|mpc ...
  *         A board that is a bridge: UART 1 goes to an emulated controller (avr_controller.h). In a script "US hang" lets the
- *         program stand still for 0.2 s, "US flip HEX..." flips a bit in RAM, where these bytes are found first.
+ *         program stand still for 0.2 s, "US flip HEX..." flips a bit in RAM, where these bytes are found first. "US sweep UNTIL
+ *         STEP WHAT", where WHAT is bytes or "open PIN...", lets WHAT happen at each instant from US to UNTIL, STEP apart, each
+ *         time to a copy of the board, and prints "INSTANT ^C after US" for the first ^C that the copy sends to the
+ *         controller ("never": within 50 ms none). To the board itself nothing happens.
  *     avr_board --program MCU IMAGE.elf
  *         Runs a program to its end (sleep without interrupts); prints what it writes to UART 0; exits with its GPIOR0.
  *
@@ -30,6 +33,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -48,6 +52,7 @@
 #define HZ 16000000u
 #define SLICE_CYCLES 8000u  /* 0.5 ms between looks at the outside */
 #define FRAME_CYCLES 16000u /* a USB frame, 1 ms */
+#define SCRIPT_LINE 4096u
 
 static avr_t *avr;
 static bool ended;
@@ -453,9 +458,80 @@ static void flip_bit(const char *text)
     fail("RAM does not hold the bytes to flip");
 }
 
+static void send_to_board(const char *text)
+{
+    uint8_t bytes[SCRIPT_LINE / 2u];
+    const size_t count = read_bytes(text, bytes, sizeof bytes);
+    for (size_t i = 0; i < count; i++)
+        put(&to_board, bytes[i]);
+    exchange();
+}
+
+/* -- The same move, stopped at each of many instants ----------------------------------------------------------------- */
+
+static avr_cycle_count_t asked; /* in a copy */
+
+/* Past stdio, whose buffer holds what the copy has printed otherwise. */
+static void tell_stop(const char *after, unsigned long long us)
+{
+    char text[64];
+    const int length =
+        snprintf(text, sizeof text, "%llu ^C %s %llu\n", (unsigned long long)(asked / CYCLES_PER_US), after, us);
+    _exit(write(STDOUT_FILENO, text, (size_t)length) == length ? 0 : 2);
+}
+
+static void to_controller(avr_irq_t *irq, uint32_t byte, void *unused)
+{
+    (void)irq;
+    (void)unused;
+    if (asked != 0 && byte == 0x03)
+        tell_stop("after", (avr->cycle - asked) / CYCLES_PER_US);
+}
+
+static void join_copy(void)
+{
+    int status;
+    errno = 0;
+    if (wait(&status) < 0 || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
+        fail("a copy of the board failed");
+}
+
+static void sweep(const char *text, avr_cycle_count_t from)
+{
+    enum { AT_ONCE = 2 };
+    char *what;
+    const avr_cycle_count_t until = strtoull(text, &what, 10) * CYCLES_PER_US,
+                            step = strtoull(what, &what, 10) * CYCLES_PER_US;
+    const char *const open = strstr(what, "open");
+    unsigned copies = 0;
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('1'), UART_IRQ_OUTPUT), to_controller, NULL);
+    for (avr_cycle_count_t when = from; step > 0 && when < until && !ended; when += step) {
+        play_until(when);
+        (void)fflush(stdout);
+        if (copies == AT_ONCE)
+            join_copy();
+        else
+            copies++;
+        const pid_t copy = fork();
+        if (copy < 0)
+            fail("fork");
+        if (copy > 0)
+            continue;
+        asked = avr->cycle;
+        if (open != NULL)
+            connect_pins(open + strlen("open"), false);
+        else
+            send_to_board(what);
+        play_until(asked + HZ / 20u);
+        tell_stop("never", 0);
+    }
+    for (; copies > 0; copies--)
+        join_copy();
+}
+
 static void play(FILE *script)
 {
-    char line[4096];
+    char line[SCRIPT_LINE];
     if (is_usb)
         usb_line_state(true);
     while (!ended && fgets(line, sizeof line, script) != NULL) {
@@ -466,6 +542,11 @@ static void play(FILE *script)
         play_until(when);
         if (strstr(rest, "stop") != NULL || strstr(rest, "off") != NULL)
             return;
+        const char *const instants = strstr(rest, "sweep");
+        if (instants != NULL) {
+            sweep(instants + strlen("sweep"), when);
+            continue;
+        }
         char *low = strstr(rest, "low"), *open = strstr(rest, "open");
         if (low != NULL || open != NULL) {
             connect_pins(low != NULL ? low + strlen("low") : open + strlen("open"), low != NULL);
@@ -480,11 +561,7 @@ static void play(FILE *script)
             hang();
             continue;
         }
-        uint8_t bytes[sizeof line / 2u];
-        const size_t count = read_bytes(rest, bytes, sizeof bytes);
-        for (size_t i = 0; i < count; i++)
-            put(&to_board, bytes[i]);
-        exchange();
+        send_to_board(rest);
     }
     errno = 0;
     fail("the script has no end: it lacks a line 'US stop'");

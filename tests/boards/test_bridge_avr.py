@@ -65,6 +65,7 @@ class Run:
         records = [(line[0], line[1].rpartition("#")[2]) for line in lines if len(line) == 2 and line[1][0] == "#"]
         self.log = [(int(us), bytes.fromhex(record)) for us, record in records if len(record) == 96]  # a reset cuts one off
         self.pins = [(int(line[0]), line[1], int(line[2])) for line in lines if len(line) == 3]
+        self.took = [(int(line[0]), int(line[3]) if line[2] == "after" else None) for line in lines if line[1] == "^C"]
         self.tip = next(point(*map(int, line[2:])) for line in lines if line[1] == "tip")
 
     def host_got(self, since=0):
@@ -104,7 +105,7 @@ def line(level, x, y, z):
 PROVED = 1_200_000  # a second after the start, and the reply
 ARMED = 1_600_000
 TO_ARM = press(ARM, 1_300_000)
-SLOW = line(0, 24000, 20000, 20000)  # 375 um: takes 1.2 s
+SLOW = line(0, 24000, 20000, 20000)  # 375 um: takes 1.2 s (an MPC-200: 250 um, 3 s)
 
 
 class Talk(unittest.TestCase):
@@ -181,17 +182,37 @@ class Stop(unittest.TestCase):
     def moving(self, events, end=ARMED + 1_000_000):
         return run([*TO_ARM, (ARMED, SLOW), *events, (end, "stop")], eeprom(compiled()))
 
-    def test_an_interrupt_is_on_the_wire_within_a_millisecond_or_so(self):
-        took = []
-        for after in [*range(45_000, 45_400, 53), *range(61_000, 66_000, 517)]:  # anywhere in a round
-            asked = ARMED + after
+    def sweep(self, what, controller, first, last, byte_us, before=(), more=""):
+        """How long a stop takes, to its first bit, that is asked for at any instant of a move. us since the host's frame."""
+        step = 173  # in 200 ms every place of a round, and of what a timer of the guard does before it, some times
+        got = run([*TO_ARM, *before, (ARMED, SLOW), (ARMED + first, f"sweep {ARMED + last} {step} {what}"),
+                   (ARMED + last + 1000, "stop")], eeprom(compiled(controller, more=more)), controller)
+        self.assertEqual(len(got.took), len(range(first, last, step)))
+        self.assertEqual([us for us, took in got.took if took is None], [])
+        return sorted(took - byte_us for _, took in got.took)
+
+    def test_a_stop_is_on_the_wire_within_a_millisecond_at_every_moment_of_a_move(self):
+        # From the last byte of the frame on; timers of the guard run out 50 and 100 ms behind it.
+        for controller, first in (("trio", 22_000), ("mpc", 53_000)):
+            for what in ("03", f"open {STOP}", f"open {STOP_2}", f"open {STOP}{STOP_2}"):
+                with self.subTest(controller, what=what):
+                    took = self.sweep(what, controller, first, first + 200_000, BYTE_US[controller] if what == "03" else 0)
+                    self.assertLessEqual(took[len(took) // 2], 700)
+                    self.assertLessEqual(took[-1], 1000)
+
+    def test_positions_that_stream_do_not_hold_a_stop_up(self):
+        for what in ("03", f"open {STOP}{STOP_2}"):
+            with self.subTest(what=what):
+                took = self.sweep(what, "mpc", 53_000, 103_000, BYTE_US["mpc"] if what == "03" else 0,
+                                  [(ARMED - 100_000, b"O")], "allow_stream = true;")
+                self.assertLessEqual(took[-1], 1000)
+
+    def test_an_interrupt_stops_the_move_and_is_answered(self):
+        for asked in range(ARMED + 45_000, ARMED + 45_300, 97):
             got = self.moving([(asked, b"\x03")], asked + 250_000)
-            sent = next(us for us, byte in got.to_controller if us > asked)
-            took.append(sent - asked - BYTE_US["trio"])  # from the end of its byte to its first bit
+            self.assertEqual(got.controller_got(asked)[:1], b"\x03")
             self.assertEqual(got.host_got(), b"\r")
             self.assertNotEqual(got.tip, SLOW[2:])
-        self.assertLessEqual(sorted(took)[len(took) // 2], 900)
-        self.assertLessEqual(max(took), 1400)  # where a timer of the guard runs out just before
 
     def test_each_stop_contact_stops_at_once_and_stays(self):
         for contact in (STOP, STOP_2):
@@ -200,7 +221,7 @@ class Stop(unittest.TestCase):
                 got = self.moving([(asked, f"open {contact}"), (asked + 400_000, f"low {contact}"),
                                    *press(ARM, asked + 450_000), (asked + 600_000, SLOW)])
                 sent = next(us for us, byte in got.to_controller if us > asked)
-                self.assertLessEqual(sent - asked, 1400)
+                self.assertLessEqual(sent - asked, 1000)
                 # Rest is proved; released, it moves nothing, and neither ARM nor the host changes that.
                 self.assertEqual(set(got.controller_got(asked)), set(b"\x03c"))
                 self.assertEqual(got.host_got(), b"")
@@ -324,7 +345,7 @@ class Watchdog(unittest.TestCase):
         plain = run([*TO_ARM, (ARMED, SLOW), (ARMED + 100_000, "stop")], eeprom(compiled()))
         frame = [us for us, byte in plain.to_controller if us > ARMED][1:]
         self.assertEqual(len(frame), 14)
-        for part in (1, 7):
+        for part in (1, 3):  # what has been pulled by then leaves by interrupts, whatever the program does
             asked = frame[part] + 20
             got = run([*TO_ARM, (ARMED, SLOW), (asked, "hang"), (asked + 1_500_000, b"\x03c"), (asked + 3_000_000, "stop")],
                       eeprom(compiled()))

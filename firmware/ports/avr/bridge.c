@@ -27,7 +27,11 @@ typedef struct {
 
 static line lines[DR_LINES];
 
-static void receive(dr_line which)
+/* In each interrupt for itself: `which` is a constant there, and half of the time is saved. At 128000 baud both ways the
+ * interrupts take a fifth of the processor. */
+#define EACH static inline __attribute__((always_inline))
+
+EACH void receive(dr_line which)
 {
     line *const l = &lines[which];
     const uint8_t status = UART(which)->status, byte = UART(which)->data;
@@ -43,7 +47,7 @@ static void receive(dr_line which)
     l->arrived++;
 }
 
-static void send(dr_line which)
+EACH void send(dr_line which)
 {
     line *const l = &lines[which];
     registers *const uart = UART(which);

@@ -176,6 +176,7 @@ void bridge_pump(bridge *b)
     keep_records(b);
     if (out_count > 0 && !stops)
         send_device(b, out, out_count);
+    (void)dr_guard_pull_device(&b->guard, bridge_now(b), out, 0); /* nothing is left to do: it seals its memory */
 }
 
 /* -- What comes in ----------------------------------------------------------------------------------------------------- */

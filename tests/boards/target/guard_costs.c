@@ -95,6 +95,9 @@ int target_main(void)
     end("guard-pull-frame");
     begin();
     (void)dr_guard_pull_device(&guard, now, bytes, sizeof bytes);
+    end("guard-pull-seals");
+    begin();
+    (void)dr_guard_pull_device(&guard, now, bytes, sizeof bytes);
     end("guard-pull-moving");
     begin();
     dr_guard_get_status(&guard, &status);
