@@ -152,7 +152,7 @@ class Talk(unittest.TestCase):
 
     def test_obstacles_are_judged_in_time_and_too_many_refuse(self):
         move = line(15, 20256, 20003, 20013)
-        for boxes, floors, tip in ((32, 0, move[2:]), (1, 8, move[2:]), (1, 31, HERE)):
+        for boxes, floors, tip in ((24, 0, move[2:]), (1, 4, move[2:]), (1, 31, HERE)):
             with self.subTest(boxes=boxes, floors=floors):
                 got = run([*TO_ARM, (ARMED, move), (ARMED + 1_400_000, "stop")], eeprom(compiled(boxes=boxes, floors=floors)))
                 self.assertEqual(got.tip, tip)
