@@ -849,7 +849,8 @@ static void row_55_a_count_that_was_lost(void)
             rig.limits.drives[0].box_q.min_q[axis] = 0;
         limits_changed();
         host_code('c');
-        fake_ms(30000);
+        fake_ms(10);
+        run_ms(30000);
         for (int axis = 0; axis < 3; axis++)
             fake.at[axis] = axis == i ? 8u : 0;
         host_line(15, 800, 800, 800);

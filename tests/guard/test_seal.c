@@ -178,6 +178,14 @@ static void a_stop_is_open_until_it_has_left(void)
     SEALED();
 }
 
+static void a_self_check_is_a_call_as_any(void)
+{
+    armed();
+    rig.guard.sealed = 0;
+    TEST_ASSERT_TRUE(dr_guard_self_check(&rig.guard, guard_clock()));
+    SEALED();
+}
+
 /* What is logged about a change of the state is there when the call that changed it returns, with its own instant. */
 static bool logs_state(uint8_t before, uint8_t after, dr_us when)
 {
@@ -448,6 +456,7 @@ int main(void)
     RUN_TEST(a_motion_is_open_while_its_bytes_are_on_their_way);
     RUN_TEST(the_seal_waits_until_nothing_is_to_do);
     RUN_TEST(a_stop_is_open_until_it_has_left);
+    RUN_TEST(a_self_check_is_a_call_as_any);
     RUN_TEST(a_change_of_the_state_is_logged_by_the_call_that_makes_it);
     RUN_TEST(what_a_late_caller_finds_is_logged_with_the_instant_when_it_was_due);
     RUN_TEST(damage_is_answered_by_one_ctrl_c);
