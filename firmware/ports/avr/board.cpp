@@ -57,8 +57,8 @@ uint16_t dr_port_inputs(void)
     if (inputs[0].levels == NULL)
         prepare_inputs();
     uint16_t closed = 0;
-    for (uint8_t i = sizeof input_pins; i > 0;
-         i--) { /* the bridge's stop contacts, which are first, as late as can be */
+    /* Backwards: the bridge's stop contacts, which are first, as late as can be. */
+    for (uint8_t i = sizeof input_pins; i > 0; i--) {
         closed <<= 1;
         if ((*inputs[i - 1].levels & inputs[i - 1].bit) == 0)
             closed |= 1;
