@@ -174,6 +174,8 @@ void proof_keep_out(void)
     o->drive = scene.drive;
     o->shape = DR_SHAPE_BOX;
     any_box(&o->box_q);
+    for (uint8_t axis = 0; axis < DR_AXES; axis++)
+        assume(request.steps[axis] <= stage.travel_steps[axis]); /* the judge looks first */
     const dr_path path = dr_judge_path(&limits, &scene, &command, &request);
     for (uint8_t axis = 0; axis < DR_AXES; axis++)
         p_q[axis] = anything_between(-DR_FAR_Q, DR_FAR_Q);
