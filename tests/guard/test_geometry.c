@@ -84,6 +84,48 @@ static void what_misses_on_any_axis_misses_wherever_it_is_on_the_others(void)
             }
 }
 
+/* On one axis: a way, an interval, and a bit for each sixth of the way that is in it. */
+typedef struct {
+    int32_t from, to, min, max;
+    unsigned in;
+} lane;
+
+#define LAST 3 /* coordinates are 0 to 3 */
+#define LANES (16u * 10u)
+
+static void all_lanes(lane lanes[LANES])
+{
+    unsigned count = 0;
+    for (int32_t from = 0; from <= LAST; from++)
+        for (int32_t to = 0; to <= LAST; to++)
+            for (int32_t min = 0; min <= LAST; min++)
+                for (int32_t max = min; max <= LAST; max++) {
+                    lane l = {from, to, min, max, 0};
+                    for (int32_t sixth = 0; sixth <= 6; sixth++) {
+                        const int32_t at = 6 * from + (to - from) * sixth;
+                        l.in |= (unsigned)(6 * min <= at && at <= 6 * max) << sixth;
+                    }
+                    lanes[count++] = l;
+                }
+    TEST_ASSERT_EQUAL(LANES, count);
+}
+
+/* A line enters and leaves a box where it crosses a whole coordinate, which is at a sixth of such short ways: it touches the box
+ * exactly if one of the sixths is in it. All lines and boxes of these coordinates, 4,096,000. */
+static void every_small_line_touches_exactly_the_boxes_that_it_meets(void)
+{
+    static lane lanes[LANES];
+    all_lanes(lanes);
+    for (const lane *x = lanes; x < lanes + LANES; x++)
+        for (const lane *y = lanes; y < lanes + LANES; y++)
+            for (const lane *z = lanes; z < lanes + LANES; z++) {
+                const dr_segment way = {{x->from, y->from, z->from}, {x->to, y->to, z->to}};
+                const dr_box box = {{x->min, y->min, z->min}, {x->max, y->max, z->max}};
+                if (dr_segment_touches_box(&way, &box) != ((x->in & y->in & z->in) != 0))
+                    TEST_FAIL_MESSAGE("a line and a box");
+            }
+}
+
 static void a_box_is_in_another_only_if_none_of_its_faces_sticks_out(void)
 {
     for (uint8_t axis = 0; axis < DR_AXES; axis++) {
@@ -206,6 +248,7 @@ int main(void)
     RUN_TEST(a_point_is_a_line_too);
     RUN_TEST(a_step_of_one_quantum_is_a_line_too);
     RUN_TEST(what_misses_on_any_axis_misses_wherever_it_is_on_the_others);
+    RUN_TEST(every_small_line_touches_exactly_the_boxes_that_it_meets);
     RUN_TEST(a_box_is_in_another_only_if_none_of_its_faces_sticks_out);
     RUN_TEST(boxes_that_are_apart_on_one_axis_do_not_touch);
     RUN_TEST(boxes_touch_at_their_faces);

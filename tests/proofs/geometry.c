@@ -2,11 +2,10 @@
  *
  *   boxes    two boxes touch exactly if they have a point in common; a grown box holds what is so near (all coordinates);
  *   half     a box touches a half-space if it has a point in it (coordinates up to 31, components of the normal up to 3);
- *   segment  a segment touches a box if one of its points is in it (coordinates up to 7: every box, segment and fifteenth);
  *   widths   no product overflows for any coordinate and direction that the header allows.
  *
- * half and segment are proved for small numbers, because nobody can multiply wide ones by logic alone; nothing in that code
- * depends on a size but the widths of the products, which are proved for all. */
+ * half is proved for small numbers, because nobody can multiply wide ones by logic alone, and segments are tried one by one
+ * (tests/guard/test_geometry.c); nothing in that code depends on a size but the widths of the products, which are proved for all. */
 #include "dr_geometry.h"
 #include "proof.h"
 
@@ -77,22 +76,6 @@ void proof_half(void)
     any_point(p_q, 31);
     if (is_in(p_q, &box) && dr_dot(half.normal, p_q) <= half.offset_q)
         assert(dr_box_touches_half(&box, &half));
-    proved();
-}
-
-/* The point at n/d of the way is in the box: on each axis min * d <= from * d + (to - from) * n <= max * d. */
-void proof_segment(void)
-{
-    dr_segment way;
-    const dr_box box = any_box(7);
-    any_point(way.from_q, 7);
-    any_point(way.to_q, 7);
-    const int32_t d = 15, n = anything_between(0, 15);
-    for (uint8_t axis = 0; axis < DR_AXES; axis++) {
-        const int32_t at = way.from_q[axis] * d + (way.to_q[axis] - way.from_q[axis]) * n;
-        assume(box.min_q[axis] * d <= at && at <= box.max_q[axis] * d);
-    }
-    assert(dr_segment_touches_box(&way, &box));
     proved();
 }
 

@@ -81,7 +81,6 @@ PROOFS = [guard(*case) for case in (
 ] + [Proof('geometry.c', f'proof_{entry}', sources=('dr_geometry.c',), plant=plant) for entry, plant in (
     ('boxes', ('dr_geometry.c', 'b->min_q[axis] || a->min_q', 'b->min_q[axis] && a->min_q')),
     ('half', ('dr_geometry.c', 'box->min_q[axis] : box->max_q', 'box->max_q[axis] : box->max_q')),
-    ('segment', ('dr_geometry.c', 'step > 0 ? to_min : -to_max', 'step > 0 ? to_min : -to_min')),
     ('widths', None),
 )]
 
