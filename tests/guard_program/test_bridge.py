@@ -295,6 +295,29 @@ class Stopping(realtime.TestCase):
                 self.at_rest(port)
             os.close(reader)
 
+    def test_a_terminal_that_nobody_reads_holds_nothing_up(self):
+        """It says that it can be written to while it has less room than a line."""
+        reader, terminal = os.openpty()
+        with guarded("trio", rig(guard.TRIO), stderr=terminal) as (_, g, port):
+            os.close(terminal)
+            for _ in range(180):
+                self.assertEqual(g.order("disarm")["state"], "disarmed")
+                g.arm()
+            port.send(line(0, 1000, 0, 0))
+            g.wait_for("moving")
+            self.assertTrue(g.order("stop")["ok"])
+            g.wait_for("stopped")
+        os.close(reader)
+
+    def test_orders_as_they_are_typed(self):
+        with guarded("trio", rig(guard.TRIO)) as (_, g, _):
+            for said in ("STOP", " stop ", "stop\r", "Stop\t\r"):
+                self.assertTrue(g.order(said)["ok"], said)
+                g.wait_for("stopped")
+                self.assertTrue(g.order("Clear\r")["ok"])
+            for said in ("stop now", "sto", "stopp", "s top", "stop" + 100 * " x", ""):
+                self.assertFalse(g.order(said)["ok"], said)
+
     def test_followers_are_not_told_of_queries(self):
         with guarded("mpc", rig(guard.MPC), *FAST) as (_, g, port), Channel(g.socket) as follower:
             follower.order("follow")
@@ -336,6 +359,25 @@ class Stopping(realtime.TestCase):
                 self.moving(g, again) # a move is stopped all the same, and that disarms
             g.wait_for("disarmed")
             self.assertEqual(g.status()["disarmed_says"], "the host's program has closed the port")
+
+    def test_half_a_command_goes_with_the_program_that_began_it(self):
+        frame = line(15, 100, 0, 0)
+        with guarded("mpc", rig(guard.MPC, more="stay_armed = true;")) as (_, g, port):
+            for cut in (1, 2, 7, 13):
+                for gap_s in (0, 0.01):
+                    g.wait_for("armed")
+                    port.send(frame[:cut])
+                    port.close()
+                    guard.pause(gap_s)
+                    port = emu.Port(g.path)
+                    port.send(frame[cut:])
+                    guard.pause(0.15) # what could begin has begun; and what is no command is forgotten
+                    emu.wait_until(lambda: g.status()["state"] in ("armed", "disarmed"), "rest")
+                    if g.status()["state"] == "disarmed": # all of it was there before the port was seen to be closed
+                        g.arm()
+                    self.at_rest(port)
+                    self.assertEqual(guard.position_mpc(port.ask(b"C", 14)), (0, 0, 0))
+            port.close()
 
     def test_a_guard_that_is_ended_stops_what_moves(self):
         with emu.directory() as directory, emu.Emulator("mpc") as e:

@@ -153,7 +153,7 @@ class Failing(realtime.TestCase):
 
 class Ending(realtime.TestCase):
     def test_nothing_is_left_behind(self):
-        for how in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        for how in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM):
             with emu.directory() as directory, emu.Emulator("mpc") as e:
                 with Guard(directory, e.path, rig(guard.MPC)) as g:
                     self.assertEqual(stat.S_IMODE(os.stat(g.socket).st_mode), 0o600)

@@ -25,6 +25,7 @@
 #define REST_US (3 * S_US)          /* at the end; then it is left as it is */
 #define STEP_US (UINT64_C(1) << 30) /* the guard tells instants apart up to 2^31 us */
 #define CHUNK 256u
+#define CHUNKS_MAX 64u
 
 enum { FD_SIGNALS, FD_INOTIFY, FD_HOST, FD_DEVICE, FD_CONTROL, FDS = FD_CONTROL + CONTROL_FDS };
 
@@ -187,6 +188,18 @@ static void tell_link(bridge *b)
     bridge_pump(b);
 }
 
+/* False: there is nothing. */
+static bool take_host_bytes(bridge *b)
+{
+    uint8_t bytes[CHUNK];
+    const size_t count = pty_read(&b->host, bytes, sizeof bytes);
+    if (count == 0)
+        return false;
+    dr_guard_push_host(&b->guard, bridge_now(b), bytes, count);
+    bridge_pump(b);
+    return true;
+}
+
 /* Who has opened and closed the host's port. */
 static void read_hints(bridge *b)
 {
@@ -202,6 +215,8 @@ static void read_hints(bridge *b)
         }
     }
     if (b->host.was_left) { /* even if the next one is there already */
+        for (unsigned i = 0; i < CHUNKS_MAX && take_host_bytes(b); i++)
+            ; /* its last words are its own: half a command must not be for the next one to complete */
         dr_guard_link(&b->guard, bridge_now(b), false, b->device.fd >= 0);
         bridge_pump(b);
     }
@@ -212,14 +227,9 @@ static void read_hints(bridge *b)
 
 static void listen_to_host(bridge *b)
 {
-    uint8_t bytes[CHUNK];
     if (b->host.opens == 0) /* it was opened a moment ago */
         read_hints(b);
-    const size_t count = pty_read(&b->host, bytes, sizeof bytes);
-    if (count == 0)
-        return;
-    dr_guard_push_host(&b->guard, bridge_now(b), bytes, count);
-    bridge_pump(b);
+    (void)take_host_bytes(b);
 }
 
 static void listen_to_device(bridge *b)
@@ -354,12 +364,17 @@ static int open_signals(void)
     (void)sigemptyset(&ending);
     (void)sigaddset(&ending, SIGINT);
     (void)sigaddset(&ending, SIGTERM);
+    (void)sigaddset(&ending, SIGQUIT); /* and others that would end it without a ^C */
+    (void)sigaddset(&ending, SIGUSR1);
+    (void)sigaddset(&ending, SIGUSR2);
+    (void)sigaddset(&ending, SIGALRM);
     if (sigaction(SIGHUP, NULL, &hangup) != 0 || hangup.sa_handler != SIG_IGN)
         (void)sigaddset(&ending, SIGHUP);
     (void)sigprocmask(SIG_BLOCK, &ending, NULL);
     (void)signal(SIGINT, SIG_DFL);
     (void)signal(SIGTERM, SIG_DFL);
     (void)signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGTSTP, SIG_IGN); /* Ctrl-Z: suspended, it would guard nothing while something moves */
     (void)signal(SIGXFSZ, SIG_IGN); /* a log that may not grow is an error to be told */
     return signalfd(-1, &ending, SFD_NONBLOCK | SFD_CLOEXEC);
 }
@@ -369,11 +384,10 @@ static void introduce(const bridge *b)
     char firmware[16];
     const dr_limits *const l = &b->rig.limits;
     (void)dr_words_firmware(firmware, sizeof firmware, l->firmware);
-    (void)fprintf(stderr,
-                  "dryrig-guard guards a Sutter %s, firmware %s, at %s. It is not affiliated with Sutter Instrument.\n"
-                  "  limits:  %s, revision %u, hash %08X\n  host:    open %s instead of %s\n",
-                  dr_words_controller((dr_kind)l->kind), firmware, b->options->port, b->options->config, l->revision,
-                  dr_limits_crc(l), b->options->link != NULL ? b->options->link : b->host.path, b->options->port);
+    say("dryrig-guard guards a Sutter %s, firmware %s, at %s. It is not affiliated with Sutter Instrument.\n"
+        "  limits:  %s, revision %u, hash %08X\n  host:    open %s instead of %s\n",
+        dr_words_controller((dr_kind)l->kind), firmware, b->options->port, b->options->config, l->revision,
+        dr_limits_crc(l), b->options->link != NULL ? b->options->link : b->host.path, b->options->port);
 }
 
 /* As when the key is turned off: a frame that has been begun is finished, so that the controller does not wait for the rest of

@@ -76,7 +76,7 @@ dr_us bridge_now(const bridge *b);
 void bridge_pump(bridge *b);
 
 /* An order of the second channel. context: the bridge. */
-void orders_take(void *context, control_client *who, const char *line);
+void orders_take(void *context, control_client *who, const char *said);
 /* Goes on with an order that takes time; call it after every event. False: nothing to wait for by itself. */
 bool orders_due(const bridge *b, uint64_t *when_us);
 void orders_continue(bridge *b);

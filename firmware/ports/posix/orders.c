@@ -7,6 +7,7 @@
 
 #include <cjson/cJSON.h>
 
+#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +19,8 @@
 #define REFUSALS_APART_US S_US /* at stderr, which hears how many there were between; followers are told each */
 #define LOG_USUAL 20u
 #define NEED_BITS 16u
+#define ORDER_MAX 64u /* longer than any */
+#define BLANKS " \t\r"
 
 static bool has(const dr_guard_status *status, unsigned need) { return (status->needs & need) != 0; }
 
@@ -364,9 +367,23 @@ static bool set_at_once(bridge *b, const char *line)
     return true;
 }
 
-void orders_take(void *context, control_client *who, const char *line)
+/* As it was meant: without capitals, and blanks or a CR around it. */
+static void put_plain(char out[ORDER_MAX], const char *said)
+{
+    size_t count = 0;
+    said += strspn(said, BLANKS);
+    for (; *said != '\0' && count < ORDER_MAX - 1; said++)
+        out[count++] = (char)tolower((unsigned char)*said);
+    while (count > 0 && strchr(BLANKS, out[count - 1]) != NULL)
+        count--;
+    out[count] = '\0';
+}
+
+void orders_take(void *context, control_client *who, const char *said)
 {
     bridge *const b = context;
+    char line[ORDER_MAX];
+    put_plain(line, said);
     unsigned count;
     const bool calibrates = (b->rig.limits.rig & DR_RIG_MAY_CALIBRATE) != 0;
     if (who->waits) { /* one after the other */

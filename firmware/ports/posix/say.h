@@ -1,5 +1,5 @@
 /* say: words for people at stderr, from a program that must not be held up: what a terminal or pipe does not take now is
- * not said. Thread-safety: any thread. */
+ * not said. Thread-safety: any thread, after a first call. */
 #ifndef SAY_H
 #define SAY_H
 
