@@ -209,17 +209,18 @@ class Run(emu.InDirectory):
         host = HOST.replace('os.write(port, b"K")', 'for i in range(300):\n  os.write(port, b"K")').replace(
             'got = b""', '  got = b""').replace("while", "  while")
         path = os.path.join(self.directory, "report")
-        for option in ("--record", "--trace", "--lint-json"):
-            for limit, status in ((1024, 1), (1 << 30, 0)):
-                done = subprocess.run([emu.PROGRAM, "run", "mpc", option, path, "--", sys.executable, "-c", host],
-                                      capture_output=True, timeout=emu.LIMIT_S, check=False,
-                                      # What a build for coverage counts is elsewhere, where it may be cut off.
-                                      env={**self.environment, "GCOV_PREFIX": os.path.join(self.directory, "counts")},
-                                      restore_signals=False,  # SIGXFSZ stays ignored: writing fails
-                                      preexec_fn=lambda most=limit: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
-                self.assertEqual((done.returncode, done.stdout), (status, b"\x01\x21\x03\r"), (option, done.stderr))
-                self.assertEqual(path.encode() in done.stderr, status == 1, done.stderr)
-                os.remove(path)
+        # What a build for coverage counts is elsewhere, where it may be cut off.
+        with emu.directory() as counts:
+            environment = {**self.environment, "GCOV_PREFIX": counts}
+            for option in ("--record", "--trace", "--lint-json"):
+                for limit, status in ((1024, 1), (1 << 30, 0)):
+                    done = subprocess.run([emu.PROGRAM, "run", "mpc", option, path, "--", sys.executable, "-c", host],
+                                          capture_output=True, env=environment, timeout=emu.LIMIT_S, check=False,
+                                          restore_signals=False,  # SIGXFSZ stays ignored: writing fails
+                                          preexec_fn=lambda most=limit: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
+                    self.assertEqual((done.returncode, done.stdout), (status, b"\x01\x21\x03\r"), (option, done.stderr))
+                    self.assertEqual(path.encode() in done.stderr, status == 1, done.stderr)
+                    os.remove(path)
 
     def test_what_the_command_leaves_running_is_not_waited_for(self):
         process = self.start_('exec 3<>"$DRYRIG_PORT"; (trap "" HUP; read -u 3 x; echo "gone $x" >"$TMPDIR/late") & echo $!; exit 4')
