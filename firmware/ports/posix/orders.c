@@ -382,7 +382,7 @@ static void put_plain(char out[ORDER_MAX], const char *said)
 void orders_take(void *context, control_client *who, const char *said)
 {
     bridge *const b = context;
-    char line[ORDER_MAX];
+    char line[ORDER_MAX] = "";
     put_plain(line, said);
     unsigned count;
     const bool calibrates = (b->rig.limits.rig & DR_RIG_MAY_CALIBRATE) != 0;
