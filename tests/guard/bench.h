@@ -112,6 +112,8 @@ void device_at_home(void);                                                /* of 
 /* As bench_start() and bench_arm(), with the test as a controller that stands where `says` says. */
 void bench_start_by_hand(void (*says)(void));
 void bench_arm_by_hand(void (*says)(void));
+/* A rig with locked knobs and these facts of DR_RIG_..., proved at home. */
+void bench_proved_by_hand(dr_kind kind, uint16_t facts);
 /* Nothing more leaves the guard, in the middle of a frame or before it, until the line goes on. */
 void line_hangs(void);
 void line_goes_on(void);

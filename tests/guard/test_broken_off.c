@@ -10,12 +10,7 @@ static void mpc_says(uint8_t drive, uint32_t x) { device_at_drive(drive, x, 8000
 
 static void armed(dr_kind kind, uint16_t facts)
 {
-    if (kind == DR_TRIO)
-        bench_trio();
-    else
-        bench_mpc();
-    rig.limits.rig = (uint16_t)(DR_RIG_KNOBS_LOCKED | facts);
-    bench_start_by_hand(device_at_home);
+    bench_proved_by_hand(kind, facts);
     bench_arm_by_hand(device_at_home);
 }
 

@@ -9,19 +9,9 @@ static dr_us guard_clock(void) { return (dr_us)(rig.clock_at_start + rig.now); }
 
 static void trio_says(uint32_t x) { device_at(x, 40000, 40000, 30); }
 
-static void proved(dr_kind kind, uint16_t facts)
-{
-    if (kind == DR_TRIO)
-        bench_trio();
-    else
-        bench_mpc();
-    rig.limits.rig = (uint16_t)(DR_RIG_KNOBS_LOCKED | facts);
-    bench_start_by_hand(device_at_home);
-}
-
 static void armed(dr_kind kind, uint16_t facts)
 {
-    proved(kind, facts);
+    bench_proved_by_hand(kind, facts);
     bench_arm_by_hand(device_at_home);
 }
 
@@ -70,7 +60,7 @@ static void a_reply_that_comes_in_the_pause_between_two_tries_proves_nothing(voi
 
 static void a_controller_that_is_silent_while_arming_refuses_nothing(void)
 {
-    proved(DR_TRIO, 0);
+    bench_proved_by_hand(DR_TRIO, 0);
     input(DR_INPUT_KEY, true);
     press(DR_INPUT_ARM);
     run_us(2002000);
@@ -132,7 +122,7 @@ static void nonsense_for_the_host_is_looked_into_before_anything_else_may_be_ask
 
 static void noise_is_more_than_sixteen_bytes_in_one_second(void)
 {
-    proved(DR_TRIO, 0);
+    bench_proved_by_hand(DR_TRIO, 0);
     for (unsigned i = 0; i < 40; i++) {
         device_says("x", 1);
         run_us(600000);
@@ -143,7 +133,7 @@ static void noise_is_more_than_sixteen_bytes_in_one_second(void)
 
 static void a_jump_is_a_fault_only_where_it_matters(void)
 {
-    proved(DR_TRIO, 0);
+    bench_proved_by_hand(DR_TRIO, 0);
     host_code('c');
     run_us(500);
     trio_says(50000);
@@ -332,7 +322,7 @@ static void a_host_may_ask_a_controller_that_fits_both(void)
 
 static void behind_a_shape_that_is_wrong_the_host_must_pause(void)
 {
-    proved(DR_TRIO, 0);
+    bench_proved_by_hand(DR_TRIO, 0);
     host_value('A', 90);
     expect_refused(DR_REASON_ANGLE_VALUE);
     host_code('c');
@@ -367,7 +357,7 @@ static void a_stop_within_a_frame_is_part_of_the_frame_too(void)
 
 static void filler_between_frames_is_counted(void)
 {
-    proved(DR_TRIO, 0);
+    bench_proved_by_hand(DR_TRIO, 0);
     host_bytes("\r\n\0\xF0\xFF", 5);
     TEST_ASSERT_EQUAL(5, status().dropped_bytes);
 }
@@ -398,7 +388,7 @@ static void arming_is_for_the_disarmed_and_by_a_fresh_press(void)
     run_us(10000);
     TEST_ASSERT_EQUAL(before, rig.wire_count);
     expect_state(DR_GUARD_IDLE);
-    proved(DR_TRIO, 0);
+    bench_proved_by_hand(DR_TRIO, 0);
     input(DR_INPUT_ARM, true);
     input(DR_INPUT_KEY, true);
     const uint32_t sent = rig.wire_count;
@@ -409,7 +399,7 @@ static void arming_is_for_the_disarmed_and_by_a_fresh_press(void)
 
 static void a_changed_tip_is_told_by_the_press(void)
 {
-    proved(DR_TRIO, 0);
+    bench_proved_by_hand(DR_TRIO, 0);
     input(DR_INPUT_TIP_CHANGED, true);
     TEST_ASSERT_TRUE((status().needs & DR_NEEDS_TIP) != 0);
     press(DR_INPUT_CONFIRM);
